@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_bringup bringup``: all processes of an arm with one command."""
+"""``ros2 run arm_bringup bringup``: start all processes of an arm with one command."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ if TYPE_CHECKING:
 
 ENABLE_TIMEOUT = 60.0  # longest time for all drives to boot and to be enabled in [s]
 BOOT_TIMEOUT = 30.0
-"""Longest time in [s] in which drives boot before they are enabled all the same."""
+"""Longest time in [s] to wait for drives to boot before they are enabled anyway."""
 OPERATIONAL = 'START'  # the NMT state of a device that has booted, on its topic nmt_state
-AGAIN = 1.0  # pause after a refusal in [s]: a drive that has not booted yet says so
+AGAIN = 1.0  # pause after a refusal in [s]; a drive that is still booting refuses
 
 
 @contextlib.contextmanager
@@ -72,9 +72,9 @@ def enabling(
     namespace: str = '',
     booted: threading.Event | None = None,
 ) -> Iterator[None]:
-    """Enable drives beside what runs in the block; ``say`` is called in any thread.
+    """Enable drives in a background thread while the block runs; any thread may call ``say``.
 
-    ``booted`` is set when all drives have, which their heartbeats may show up to 1 s later.
+    ``booted`` is set when all drives have booted; heartbeats may show that up to 1 s later.
     """
     ended = threading.Event()
     thread = threading.Thread(
@@ -109,7 +109,7 @@ def _enable(
     deadline = time.monotonic() + ENABLE_TIMEOUT
     try:
         client.prepare(itertools.chain(*groups))
-        with contextlib.suppress(CallError):  # their services say why
+        with contextlib.suppress(CallError):  # the services report why
             _await_boot(client, groups[0], booted)
         while (refusal := _refusal(client, groups)) and time.monotonic() < deadline:
             client.wait_until(_after(AGAIN), 2 * AGAIN, 'another try')
@@ -118,13 +118,13 @@ def _enable(
         else:
             say(f'all {len(drives)} drives are enabled, in {mode_service}')
     except GivenUpError:
-        pass  # the bring-up ends, and says why
+        pass  # the bring-up ends, and reports why
     finally:
         client.close()
 
 
 def _await_boot(client: ServiceClient, services: Sequence[str], booted: threading.Event) -> None:
-    """Wait until the devices of drives are operational, of those that publish ``nmt_state``."""
+    """Wait until ``booted`` is set or all drives that publish ``nmt_state`` are operational."""
     from std_msgs.msg import String
 
     from node_runner import LATCHED
@@ -153,7 +153,7 @@ def _await_boot(client: ServiceClient, services: Sequence[str], booted: threadin
 
 
 def _refusal(client: ServiceClient, groups: Sequence[list[str]]) -> str:
-    """Call services one group after the other; return why one refused, empty when none did."""
+    """Call groups of services in sequence; return why one refused, or an empty string."""
     try:
         for services in groups:
             client.call(services, ENABLE_TIMEOUT)
@@ -181,9 +181,9 @@ def next_commands(
     simulated: bool,
     planned: bool = False,
 ) -> str:
-    """Return the commands to print; ``controllers`` are those of trajectories.
+    """Return suggested commands to print; ``controllers`` are the trajectory controllers.
 
-    A target of a single drive is absolute, so it is proposed for simulated ones only.
+    A target of a single drive is absolute, so it is suggested for simulated drives only.
     """
 
     def lines() -> Iterator[str]:
@@ -207,7 +207,7 @@ def next_commands(
 
 
 def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line: what was asked for, and the options of all nodes."""
+    """Parse the command line: return its arguments, and the ROS options of all nodes."""
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup bringup',
         description='Bring an arm up: CANopen master with all its drives, /joint_states, '
@@ -250,10 +250,10 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Bring an arm up and stay until it is to go down.
+    """Bring up an arm, and run until Ctrl-C or SIGTERM.
 
     Returns:
-        0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.
+        0 after Ctrl-C or SIGTERM, 1 if a process failed, 2 if nothing was started.
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
@@ -322,7 +322,7 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
 
 
 def _programs(arguments: argparse.Namespace, master: Executable) -> Iterator[Executable]:
-    """Yield the programs that will be started, those first that are started first."""
+    """Yield the programs to start, in order of their start."""
     if arguments.simulate:
         yield SLAVES
     yield from (master, STATE_PUBLISHERS[-1])

@@ -33,20 +33,20 @@ if TYPE_CHECKING:
     from arm_canopen.config import AxisUnits
 
 EXAMPLE_ACCELERATIONS = (2.0, 0.5)
-"""Modest limits to begin with: of an axis that turns in [rad/s2], of a linear one in [m/s2]."""
+"""Moderate initial limits of acceleration: rotary axis in [rad/s2], linear axis in [m/s2]."""
 
 
 def srdf_command(robot: Robot) -> str:
-    """Return the command that makes or completes the SRDF of a robot."""
+    """Return the command that creates or completes the SRDF of a robot."""
     return f'ros2 run arm_planning srdf {robot.folder}/ --output {robot.semantic}'
 
 
 def check_semantic(
     robot: Robot, tree: KinematicTree
 ) -> tuple[list[Finding], SemanticDescription | None]:
-    """Compare the SRDF of a robot with its description; return what is wrong.
+    """Compare the SRDF of a robot with its description; return findings and the SRDF.
 
-    The SRDF is returned where no group mixes names of the description with others.
+    The SRDF is None if any finding is an error.
     """
     place = robot.semantic.name
     try:
@@ -62,7 +62,7 @@ def check_semantic(
 
 
 def _groups(place: str, semantic: SemanticDescription, tree: KinematicTree) -> Iterable[Finding]:
-    """Find names of groups that the description does not have."""
+    """Find names in groups that the description does not define."""
     joints = {joint.name for joint in tree.joints} | set(semantic.virtual)
     known = {'joint': sorted(joints), 'link': sorted(tree.links), 'group': list(semantic.groups)}
     named = {name: _named(group) for name, group in semantic.groups.items()}
@@ -72,7 +72,7 @@ def _groups(place: str, semantic: SemanticDescription, tree: KinematicTree) -> I
     }
     absent = [name for name in named if lost[name] == named[name]]
     if len(absent) == len(named):
-        absent = []  # the SRDF is that of another robot
+        absent = []  # the SRDF belongs to another robot
     for name in absent:
         yield warning(
             f'{place}, group {name}',
@@ -91,7 +91,7 @@ def _groups(place: str, semantic: SemanticDescription, tree: KinematicTree) -> I
 
 
 def _named(group: Group) -> Mapping[str, Sequence[str]]:
-    """Return what a group names, each once."""
+    """Return the names that a group contains, by kind, without duplicates."""
     links = [link for chain in group.chains for link in chain] + list(group.links)
     return {
         'joint': [*group.joints],
@@ -101,7 +101,7 @@ def _named(group: Group) -> Mapping[str, Sequence[str]]:
 
 
 def check_robot(robot: Robot) -> list[Finding]:
-    """Check everything in a robot folder; return what is wrong."""
+    """Check all files of a robot folder; return the findings."""
     findings, drives = _bus(robot)
     try:
         urdf = read_description(robot)
@@ -125,14 +125,12 @@ def check_robot(robot: Robot) -> list[Finding]:
         return [*findings, *found]
     moving = [joint.name for joint in tree.joints if joint.independent]
     if not drives or set(drives) - set(moving):
-        drives = dict.fromkeys(
-            moving
-        )  # what is wrong with the names of drives is reported already
+        drives = dict.fromkeys(moving)  # wrong drive names are reported already
     return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
 
 
 def _looks(robot: Robot, tree: KinematicTree) -> Iterable[Finding]:
-    """Find what the page would not show, or show grey; each problem once."""
+    """Find links that the web page would not show, or show grey; each problem once."""
     found: dict[str, str] = {}  # link by problem
     for shape in tree.visuals():
         if shape.note:
@@ -147,7 +145,7 @@ def _looks(robot: Robot, tree: KinematicTree) -> Iterable[Finding]:
 
 
 def _remedies(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Iterable[str]:
-    """Explain how to make each missing file."""
+    """Yield a remedy for each missing file."""
     if not robot.semantic.is_file():
         yield f'{srdf_command(robot)} makes the SRDF'
     if not robot.limits.is_file():
@@ -165,7 +163,7 @@ def _remedies(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Ite
 
 
 def _bus(robot: Robot) -> tuple[list[Finding], dict[str, AxisUnits | None]]:
-    """Return what is wrong with bus.yml, and what its drives are set to, by joint."""
+    """Return the findings on bus.yml, and the unit settings of its drives by joint."""
     from arm_canopen.config import check_file
 
     report = check_file(robot.bus_config)
@@ -229,11 +227,11 @@ def _meant(name: str, free: Collection[str]) -> str:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Check a robot folder and say what is wrong.
+    """Check a robot folder and print the findings.
 
     Returns:
-        0 when nothing is wrong or warned of only, 1 when there is an error, 2 when there is no
-        such robot.
+        0 without errors (warnings are allowed), 1 with an error, 2 if the robot does not
+        exist.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup check',

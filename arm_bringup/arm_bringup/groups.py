@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which groups of an SRDF are moved, what their nodes need to know, and where their drives start.
+"""Moving groups of an SRDF, parameter files of their nodes, and start positions of their drives.
 
-arm_servo is an optional companion: it brings kinematics and solvers, which the drives alone do not
-need, and nothing here imports it.
+arm_servo is an optional dependency, which this module does not import: it brings kinematics and
+solvers that the drives alone do not need.
 
-Real arms have absolute encoders and are switched on somewhere in their ranges. Simulated drives
-start at 0, unless some joints are beyond their limits there, or links collide: from there nothing
-would move.
+Real arms have absolute encoders and power up anywhere in their ranges. Simulated drives start at
+0, unless a joint limit or a collision there would prevent motion.
 """
 
 from __future__ import annotations
@@ -48,25 +47,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MovedGroups:
-    """The groups of a robot that are moved; no two have a joint in common."""
+    """The moving groups of a robot, which share no joints."""
 
     arms: tuple[str, ...]
-    """Groups that are jogged and follow trajectories; the first is the main one."""
+    """Groups that can jog and follow trajectories; the first is the main one."""
     tools: tuple[str, ...] = ()  # groups of end effectors
     joints: Mapping[str, Sequence[str]] = field(default_factory=dict, compare=False)
-    """Joints of each group, by its name."""
+    """Joints of each group, by group name."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All of them."""
+        """Names of all groups, arms first."""
         return (*self.arms, *self.tools)
 
 
 def moved_groups(robot: Robot) -> MovedGroups:
-    """Choose the groups of a robot folder that are moved; as :func:`choose_groups`.
+    """Choose the moving groups of a robot folder; see :func:`choose_groups`.
 
     Raises:
-        RobotError: A file cannot be read, or there is no such group.
+        RobotError: A file cannot be read, or a group does not exist.
     """
     drives = read_bus(robot).joints
     try:
@@ -79,14 +78,14 @@ def moved_groups(robot: Robot) -> MovedGroups:
 def choose_groups(
     robot: Robot, semantic: SemanticDescription, tree: KinematicTree, drives: Collection[str]
 ) -> MovedGroups:
-    """Choose the groups that are moved.
+    """Choose the groups to move.
 
-    Arms are what the robot folder names; else all groups of the SRDF that have drives, are
-    neither end effectors nor made of groups, and share no joint with a group before them. Tools
+    Arms are the groups that the robot folder names; else all SRDF groups that have drives, are
+    neither end effectors nor composed of groups, and share no joint with an earlier group. Tools
     are the end effectors that have drives.
 
     Raises:
-        RobotError: The SRDF has no such group, none with drives, or two share a joint.
+        RobotError: A group does not exist, no group has drives, or two groups share a joint.
     """
     known = ', '.join(semantic.groups) or 'none'
     hint = f'groups: {known}. Choose with group in {SETTINGS}, or --group NAME'
@@ -117,9 +116,9 @@ def choose_groups(
 def _arms_named_as_tools(
     semantic: SemanticDescription, tree: KinematicTree, joints: Mapping[str, Sequence[str]]
 ) -> set[str]:
-    """Return groups of end effectors that move the link which carries these: they are the arms.
+    """Return end effector groups that move their own parent link, and so are really arms.
 
-    SRDFs of other planners than MoveIt name the arm there.
+    SRDFs made for planners other than MoveIt declare arms this way.
     """
     return {
         each.group
@@ -132,7 +131,7 @@ def _arms_named_as_tools(
 
 
 def _joints(name: str, semantic: SemanticDescription, tree: KinematicTree) -> Sequence[str]:
-    """Return the joints of a group; none where it cannot be moved."""
+    """Return the joints of a group; empty if the group cannot be moved."""
     try:
         return find_group(tree, semantic, name).joints
     except urdf_reader.DescriptionError:
@@ -140,7 +139,7 @@ def _joints(name: str, semantic: SemanticDescription, tree: KinematicTree) -> Se
 
 
 def _disjoint(names: Sequence[str], joints: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """Return the groups that share no joint with one before them."""
+    """Return the groups that share no joint with an earlier group."""
     taken: set[str] = set()
     found = []
     for name in names:
@@ -191,19 +190,19 @@ def planning_files(
 
 
 def _write(path: Path, nodes: Mapping[str, Mapping[str, object]]) -> Path:
-    """Write parameters by how names of nodes end; JSON is YAML, whatever characters are in it."""
+    """Write parameters by node name suffix, as JSON, which is valid YAML for any characters."""
     table = {EVERY_NODE + name: {'ros__parameters': values} for name, values in nodes.items()}
     path.write_text(json.dumps(table), encoding='utf-8')
     return path
 
 
 def gripper_action(joints: Sequence[str]) -> str:
-    """Return the action by which a gripper of so many joints is moved, by MoveIt's name of it."""
+    """Return MoveIt's name of the action for a gripper with these joints."""
     return 'GripperCommand' if len(joints) == 1 else 'ParallelGripperCommand'
 
 
 def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
-    """Return the name of each group's controller; controllers.yaml may name that of the first."""
+    """Return each group's controller name; controllers.yaml may set that of the first group."""
     try:
         table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
     except StartError as error:
@@ -216,26 +215,26 @@ def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class StartPositions:
-    """Where simulated drives stand at power-on."""
+    """Positions of simulated drives at power-on."""
 
     positions: Mapping[str, float] = field(default_factory=dict)
     """Positions that are not 0, by joint, in [rad or m]."""
-    reason: str = ''  # why they are not 0, in words
+    reason: str = ''  # why they are not 0, as text
 
     def __str__(self) -> str:
-        """Return one line for the log; empty where all stand at 0."""
+        """Return one line for the log; empty if all positions are 0."""
         places = ', '.join(f'{name} {place:g}' for name, place in self.positions.items() if place)
         return f'simulated drives start at {places}, because {self.reason}' if places else ''
 
 
 def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPositions:
-    """Choose where the simulated drives of a robot stand at power-on.
+    """Choose the positions of a robot's simulated drives at power-on.
 
-    What robot.yaml says counts. Otherwise a group that cannot stand at 0 starts from its start
-    pose, and another drive that cannot from the middle of its range.
+    Positions in robot.yaml apply. Otherwise a group that cannot be at 0 starts in its start pose,
+    and any other drive that cannot be at 0 in the middle of its range.
 
     Raises:
-        RobotError: robot.yaml names something that is no drive, or no pose is found.
+        RobotError: robot.yaml names an unknown drive, or no pose is found.
     """
     if robot.start_positions:
         return StartPositions(given_positions(robot, drives), f'{SETTINGS} has {START_POSITIONS}')
@@ -256,10 +255,10 @@ def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPosi
 
 
 def given_positions(robot: Robot, drives: Sequence[str]) -> Mapping[str, float]:
-    """Return the start positions that robot.yaml gives, by drive in [rad or m].
+    """Return the start positions from robot.yaml, by drive in [rad or m].
 
     Raises:
-        RobotError: It names something that is no drive, or a pose that the SRDF does not have.
+        RobotError: robot.yaml names an unknown drive, or a pose that the SRDF lacks.
     """
     given = robot.start_positions
     if isinstance(given, str):
@@ -273,7 +272,7 @@ def given_positions(robot: Robot, drives: Sequence[str]) -> Mapping[str, float]:
 
 
 def _pose(robot: Robot, name: str) -> Mapping[str, float]:
-    """Return a pose of the SRDF, of all groups that have one of this name."""
+    """Return a named SRDF pose, merged from all groups that define it."""
     key = f'{robot.folder / SETTINGS}: {START_POSITIONS}'
     if not robot.semantic.is_file():
         raise RobotError(f'{key}: {name!r} is a pose of the SRDF, and there is none')
@@ -288,7 +287,7 @@ def _pose(robot: Robot, name: str) -> Mapping[str, float]:
 
 
 def _models(robot: Robot, urdf: str) -> list[RobotModel]:
-    """Return the groups that are moved; none where nothing can move them."""
+    """Return the models of the moving groups; empty if nothing can move them."""
     if robot.lacking:
         return []
     try:
@@ -300,11 +299,11 @@ def _models(robot: Robot, urdf: str) -> list[RobotModel]:
         groups = moved_groups(robot).names
         return [RobotModel(urdf, semantic, limits, group) for group in groups]
     except (ArmError, BringupError):
-        return []  # what is to move them reports it
+        return []  # the program that moves them reports it
 
 
 def _trouble_at_zero(model: RobotModel) -> str:
-    """Return why a group cannot stand at 0; empty where it can."""
+    """Return why a group cannot be at 0; empty if it can."""
     import numpy as np
 
     zero = np.zeros(len(model))

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Findings of the check, and the part of it that needs kinematics.
+"""Findings of ``check.py``, and the checks that need kinematics.
 
-What is wrong is a :class:`Finding`, in all of ``check.py``. Here are those
-about limits, and about the pose that an arm starts from.
+Each problem is a :class:`Finding`. This module checks limits, poses and the
+start pose of an arm.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong."""
+    """One problem in a robot folder."""
 
-    # ERROR: the robot does not run, or not as it is described; WARNING: something will surprise
+    # ERROR: the robot does not run, or not as described; WARNING: unexpected behaviour is likely
     severity: Severity
     place: str  # file, and what in it
     problem: str  # what is wrong
     remedy: str  # what to do
 
     def __str__(self) -> str:
-        """Format it in two lines or more."""
+        """Format the finding in two or more lines."""
         remedy = textwrap.indent(self.remedy, '    ')
         return f'{self.severity.value}: {self.place}: {self.problem}\n{remedy}'
 
 
 def error(place: str, problem: str, remedy: str) -> Finding:
-    """Return an error."""
+    """Return a finding of severity ERROR."""
     return Finding(Severity.ERROR, place, problem, remedy)
 
 
 def warning(place: str, problem: str, remedy: str) -> Finding:
-    """Return a warning."""
+    """Return a finding of severity WARNING."""
     return Finding(Severity.WARNING, place, problem, remedy)
 
 
-LONGER = 5.0  # times the way of a stop within the limits, from which on one surprises
+LONGER = 5.0  # stopping distance, as a multiple of that within the limits, that gives a warning
 START = 'ready'  # pose of the SRDF from which an arm starts
 SINGULAR = 0.05
-"""Least singular value of the Jacobian, lengths divided by the reach, of a good start."""
+"""Least singular value of the Jacobian (lengths divided by the reach) in a good start pose."""
 CLEARANCE = 0.01  # least distance between links at the start in [m]
 MARGIN = 0.02  # share of the range of a joint that a good start leaves on either side
 
@@ -67,9 +67,9 @@ def check_motion(
     semantic: SemanticDescription,
     drives: Mapping[str, AxisUnits | None],
 ) -> list[Finding]:
-    """Check the files that trajectories and jogging need; SRDF and limits exist.
+    """Check the files for trajectories and jogging; SRDF and limits must exist.
 
-    ``drives`` are the joints with a drive, and what it is set to, where that is known.
+    ``drives`` maps each joint with a drive to the drive's settings, or None if unknown.
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel
@@ -125,7 +125,7 @@ def check_motion(
 def _not_executed(
     robot: Robot, groups: MovedGroups, semantic: SemanticDescription, tree: KinematicTree
 ) -> Iterable[Finding]:
-    """Find parts of a group that is moved as a whole, such as an arm on its rail."""
+    """Find groups whose plans are not executed, as a larger group with their joints moves."""
     moved = {joint: arm for arm in groups.arms for joint in find_group(tree, semantic, arm).joints}
     others = [] if robot.groups else [arm for arm in semantic.arms if arm not in groups.names]
     for name in others:
@@ -145,7 +145,7 @@ def _not_executed(
 
 
 def _note(robot: Robot, note: str) -> tuple[str, str, str]:
-    """Return place, problem and remedy of what the model passed over or took a default for."""
+    """Return place, problem and remedy for a note of the model on skipped or defaulted data."""
     if 'limits file' in note or 'any file' in note:
         return robot.limits.name, note, 'write the limits where you know them'
     if 'disable_collisions' in note:
@@ -161,7 +161,7 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
 
 
 def _limits(robot: Robot, limits: Mapping[str, Any], tree: KinematicTree) -> Iterable[Finding]:
-    """Find limits of joints that the description does not have: misspelt ones are errors."""
+    """Find limits for joints that the description lacks; misspelt names are errors."""
     joints = {joint.name for joint in tree.joints}
     idle = [joint.name for joint in tree.movable() if joint.name not in limits]
     for name in limits:
@@ -175,7 +175,7 @@ def _limits(robot: Robot, limits: Mapping[str, Any], tree: KinematicTree) -> Ite
 
 
 def _found_start(robot: Robot, model: RobotModel) -> Finding:
-    """Return with which pose an arm starts for which its SRDF has no such pose."""
+    """Return a finding that proposes a start pose for an arm whose SRDF has none."""
     from arm_model import ModelError, start_pose
 
     known = ', '.join(model.poses) or 'none'
@@ -223,7 +223,7 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
     clearance = model.clearance(start)
     if clearance < CLEARANCE:
         pair = model.nearest(start, CLEARANCE, 1)[0].links
-        if clearance > 0.0:  # some links of an arm are as near as that wherever it is
+        if clearance > 0.0:  # some links of an arm are this near in every pose
             problem = f'{pair[0]} and {pair[1]} are {1e3 * clearance:.0f} mm apart'
             yield warning(place, problem, 'fine where they are never much further apart')
             return
@@ -233,7 +233,7 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
 
 
 def _poses(robot: Robot, model: RobotModel) -> Iterable[Finding]:
-    """Find poses in collision, besides the start."""
+    """Find poses in collision, except the start pose."""
     for name, positions in model.poses.items():
         for each in model.nearest(positions, 0.0, 1) if name != START else ():
             place = f'{robot.semantic.name}, group {model.group}, pose {name!r}'
@@ -250,7 +250,7 @@ def _controllers(
     from arm_servo import check_parameters
 
     if not robot.controllers.is_file() or len(models) < len(groups.names):
-        return  # what is wrong with a group is reported already
+        return  # problems of a group are reported already
     place = robot.controllers.name
     moved = GroupModels(
         *([models[name] for name in names] for names in (groups.arms, groups.tools))
@@ -292,7 +292,7 @@ def _controllers(
 def check_drives(
     place: str, drives: Mapping[str, AxisUnits | None], limits: JointLimits
 ) -> Iterable[Finding]:
-    """Check speed limit and decelerations of each drive; None where these are unknown."""
+    """Check speed limit and decelerations of each drive; skip drives with unknown settings."""
     from canopen_core.standard import Index
 
     rows = zip(limits.names, limits.velocity, limits.acceleration, strict=True)

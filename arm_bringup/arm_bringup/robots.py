@@ -14,19 +14,18 @@
       controllers.yaml      for motion, optional: parameters of the nodes that move the arm
       robot.yaml            optional: files of other names, xacro arguments, packages, group
 
-A robot is asked for by name, which means a folder that this package installs, or by a path, which
-means a folder of the user's own. Files of others are taken as they are: what a xacro file includes
-for ros2_control or Gazebo is left out where it is not installed, because the drives are on a
-CANopen bus here.
+A robot is selected by name (a folder that this package installs) or by path (a folder of the
+user). Third-party files work unchanged: includes of a xacro file for ros2_control or Gazebo are
+skipped if they are not installed, because the drives are on a CANopen bus here.
 
 ::
 
     BringupError
-    ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists what there is
-    ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
+    ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists the alternatives
+    ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is unusable
     └── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
 
-What cannot be started, or refuses, raises the errors of ``process_supervisor``.
+Programs that fail to start and services that refuse raise errors of ``process_supervisor``.
 """
 
 from __future__ import annotations
@@ -74,16 +73,16 @@ class WaveError(BringupError, ValueError):
 
 
 BUS_CONFIG = 'bus.yml'  # name of the bus configuration in a robot folder
-SETTINGS = 'robot.yaml'  # name of the file with what the names of files do not say
+SETTINGS = 'robot.yaml'  # name of the settings file
 FILES: Mapping[str, Sequence[str]] = {
     'description': ('{name}.urdf.xacro', '{name}.xacro', '{name}.urdf'),
     'semantic': ('{name}.srdf', '{name}.srdf.xacro'),
     'limits': ('limits.yaml', 'joint_limits.yaml'),
     'controllers': ('controllers.yaml',),
 }
-"""Names of each file of a robot folder; the first that exists is taken."""
+"""File name patterns of a robot folder by key; the first existing file is used."""
 TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
-"""Keys of :data:`SETTINGS` that are tables of text, and those that are text."""
+"""Keys of :data:`SETTINGS` with tables of strings, and those with strings."""
 GROUP = 'group'  # key of one group, or of a list
 START_POSITIONS = 'start_positions'  # key of the positions of simulated drives at power-on
 KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)  # all keys of SETTINGS
@@ -93,7 +92,7 @@ KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)  # all keys of SETTINGS
 class Robot:
     """A complete robot folder.
 
-    Files that are optional may not be there.
+    Optional files may not exist.
     """
 
     name: str  # of the folder
@@ -102,23 +101,23 @@ class Robot:
     semantic: Path = Path()
     limits: Path = Path()
     controllers: Path = Path()
-    xacro_args: Mapping[str, str] = field(default_factory=dict)  # of description and SRDF
+    xacro_args: Mapping[str, str] = field(default_factory=dict)  # for description and SRDF
     packages: Mapping[str, Path] = field(default_factory=dict)  # not in AMENT_PREFIX_PATH
-    groups: tuple[str, ...] = ()  # of the SRDF that are moved; empty takes all arms of it
-    tip_link: str = ''  # that is moved; empty takes the end of the first group
+    groups: tuple[str, ...] = ()  # SRDF groups to move; empty selects all arms
+    tip_link: str = ''  # link to move; empty selects the end of the first group
     start_positions: Mapping[str, float] | str = field(default_factory=dict)
-    """Of simulated drives at power-on, by name, in [rad or m]; or a pose of the SRDF."""
+    """Positions of simulated drives at power-on, by name in [rad or m], or an SRDF pose."""
     expanded: dict[Path, str] = field(default_factory=dict, init=False, repr=False, compare=False)
-    """Its xacro files as XML text, each once: it takes 0.1 s."""
+    """Cache of expanded xacro files as XML text, as each expansion takes 0.1 s."""
 
     @property
     def folder(self) -> Path:
-        """Where its files are: that of bus.yml."""
+        """The folder of bus.yml, which contains the robot's files."""
         return self.bus_config.parent
 
     @property
     def lacking(self) -> str:
-        """Names of the files that it lacks for trajectories and jogging; empty when it moves."""
+        """Names of missing files for trajectories and jogging; empty if none is missing."""
         files = (self.semantic, self.limits)
         return ' and '.join(path.name for path in files if not path.is_file())
 
@@ -127,7 +126,7 @@ def installed_robots_folder() -> Path:
     """Return the folder with the robots of this package.
 
     Raises:
-        RobotError: The package is not installed where ROS looks for it.
+        RobotError: ROS does not find the installed package.
     """
     from ament_index_python import get_package_share_path, PackageNotFoundError
 
@@ -146,10 +145,10 @@ def robot_names(folder: Path) -> list[str]:
 
 
 def find_robot(wanted: str, folder: Path) -> Robot:
-    """Find a robot by its name in a folder of robots, or by a path, which has a slash.
+    """Find a robot by its name in a folder of robots, or by a path, which contains a slash.
 
     Raises:
-        RobotError: There is no such robot, a file is missing, or robot.yaml cannot be used.
+        RobotError: The robot does not exist, a file is missing, or robot.yaml is invalid.
     """
     if os.sep in wanted:
         return _robot(Path(wanted).expanduser().resolve())
@@ -191,7 +190,7 @@ def _robot(folder: Path) -> Robot:
 
 
 def _file(folder: Path, key: str, named: str) -> Path:
-    """Return the file of a key: that which robot.yaml names, or the first that exists."""
+    """Return the file of a key: the one named in robot.yaml, or the first existing one."""
     if named:
         path = (folder / Path(named).expanduser()).resolve()
         if not path.is_file():
@@ -202,7 +201,7 @@ def _file(folder: Path, key: str, named: str) -> Path:
 
 
 def _settings(path: Path) -> dict[str, Any]:
-    """Read robot.yaml: words by key, and tables of words."""
+    """Read the settings in robot.yaml, by key."""
     try:
         document = yaml.safe_load(path.read_text(encoding='utf-8')) if path.is_file() else None
     except (OSError, yaml.YAMLError) as error:
@@ -242,7 +241,7 @@ def _positions(path: Path, value: object) -> dict[str, float] | str:
 
 
 def _word(path: Path, key: str, value: object) -> str:
-    """Return a value as text, booleans as xacro writes them."""
+    """Convert a value to a string, booleans as in xacro."""
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(value, (str, int, float)):
@@ -251,11 +250,11 @@ def _word(path: Path, key: str, value: object) -> str:
 
 
 def read_bus(robot: Robot) -> BusConfig:
-    """Read the bus.yml of a robot, and so find its mistakes before anything is started.
+    """Read the bus.yml of a robot, which finds errors in it before anything starts.
 
     Raises:
-        RobotError: The file, or an EDS that it names, is wrong, or it has no drive; the message
-            says where and what.
+        RobotError: The file or an EDS that it names is invalid, or it defines no drive; the
+            message gives place and problem.
     """
     from arm_canopen import CanopenError, load_bus
 
@@ -269,10 +268,10 @@ def read_bus(robot: Robot) -> BusConfig:
 
 
 def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
-    """Use the namespace of bus.yml for all nodes, unless the command line has one.
+    """Use the namespace of bus.yml for all nodes, unless the command line sets one.
 
     Raises:
-        RobotError: Its nodes are in several.
+        RobotError: The nodes of bus.yml are in several namespaces.
     """
     named = [bus.master.namespace, *(node.namespace for node in bus.nodes)]
     given = {namespace.strip('/') for namespace in named} - {''}
@@ -288,7 +287,7 @@ INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
 
 
 def stream_mode_service(bus: BusConfig) -> str:
-    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position."""
+    """Return the service for the streaming mode: as set in bus.yml, else cyclic position."""
     drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
     if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
         return 'interpolated_position_mode'
@@ -296,13 +295,13 @@ def stream_mode_service(bus: BusConfig) -> str:
 
 
 RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
-"""Meshes beside the description, which the nodes that read it would not find."""
+"""Pattern of mesh paths relative to the description, which nodes could not resolve."""
 
 
 def read_description(robot: Robot) -> str:
     """Return the URDF of a robot as XML text."""
     urdf = _read(robot.description, robot)
-    for name, folder in robot.packages.items():  # only this robot folder knows them
+    for name, folder in robot.packages.items():  # known only to this robot folder
         urdf = urdf.replace(f'package://{name}/', f'{folder.as_uri()}/')
     return RELATIVE_MESH.sub(
         lambda found: found[1] + (robot.description.parent / found[2]).resolve().as_uri(), urdf
@@ -332,11 +331,11 @@ def expand_xacro(
 ) -> str:
     """Expand a xacro file to XML text.
 
-    ``packages`` are folders of packages that are not in AMENT_PREFIX_PATH, by name.
+    ``packages`` maps names of packages that are not in AMENT_PREFIX_PATH to their folders.
 
     Raises:
-        DescriptionError: The file cannot be expanded; the message is xacro's own, or names the
-            package or argument that is missing and the remedy.
+        DescriptionError: The file cannot be expanded; the message is from xacro, or names the
+            missing package or argument and the remedy.
     """
     try:
         return urdf_reader.expand_xacro(path, arguments, packages)
@@ -350,7 +349,7 @@ def expand_xacro(
 
 
 def joint_limits(urdf: str) -> dict[str, JointRange]:
-    """Read the limits of all joints that move by themselves, in the order of the URDF."""
+    """Read the limits of all movable joints except mimic joints, in URDF order."""
     try:
         return read_urdf(urdf).ranges()
     except urdf_reader.DescriptionError as error:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A ROS client that calls services of many nodes side by side."""
+"""ROS client that calls services of many nodes in parallel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from process_supervisor.graph_client import GraphClient
 
 
 class ServiceClient(GraphClient):
-    """A node of its own; use it in one thread."""
+    """Service client with its own node; use it in one thread."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph."""
@@ -23,25 +23,25 @@ class ServiceClient(GraphClient):
         self._clients: dict[str, Any] = {}
 
     def prepare(self, services: Iterable[str]) -> None:
-        """Create clients of services that will be called, so that they are matched in time."""
+        """Create clients for services to call later, so that DDS discovers them in time."""
         for name in services:
             self._clients[name] = self.node.create_client(Trigger, name)
 
     def is_ready(self, service: str) -> bool:
-        """Whether a service that was prepared is there."""
+        """Return whether a prepared service is available."""
         return bool(self._clients[service].service_is_ready())
 
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
-        """Call services that were prepared side by side, each once its node knows this client.
+        """Call prepared services in parallel, each after its node has discovered this client.
 
-        All together may take so long in [s].
+        ``timeout`` in [s] is for all calls together.
 
         Returns:
-            What each answered.
+            The response message of each service.
 
         Raises:
-            CallError: One did not answer or refused; the message says why, for each.
-            GivenUpError: It is no longer wanted.
+            CallError: A service did not answer or refused; the message says why, for each.
+            GivenUpError: The caller gave up.
         """
         clients = {name: self._clients[name] for name in services}
         end = time.monotonic() + timeout

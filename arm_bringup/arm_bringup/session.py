@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What bring-up and demos have in common: from the command line to a list of processes."""
+"""Shared code of bring-up and demos: from the command line to a list of processes."""
 
 from __future__ import annotations
 
@@ -44,20 +44,20 @@ from .robots import (
 )
 
 REAL_BUS = 'can0'
-"""Bus without --can on hardware: never one on which only simulated drives could be."""
+"""Default bus on hardware; never a bus that can only have simulated drives."""
 SIMULATED_BUS = 'auto'
-"""Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
-BUS_REMEDY = 'another bus with --can'  # what a second bring-up on a bus is advised to take
+"""Default bus in simulation: vcan0 if it exists, else multicast on the loopback."""
+BUS_REMEDY = 'another bus with --can'  # remedy for a second bring-up on the same bus
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """An arm that is about to be brought up."""
+    """Settings of an arm that is ready to be brought up."""
 
     robot: Robot
     bus: str  # name of its CAN bus, no longer ``auto``
     drives: list[str]  # in the order of bus.yml
-    ros: RosOptions  # of all nodes
+    ros: RosOptions  # options of all nodes
     mode_service: str  # selects the mode in which all of them follow a stream
     urdf: str
     start: str  # where the simulated drives stand at power-on, and why, for the log
@@ -65,7 +65,7 @@ class Session:
 
 
 def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
-    """Declare the arguments that bring-up and demo share."""
+    """Declare the arguments that bring-up and demos share."""
     add_robot(parser)
     parser.add_argument(
         '--can',
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
 
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments that say which robot; for :func:`locate`."""
+    """Declare the arguments that select the robot; :func:`locate` reads them."""
     parser.add_argument(
         'robot',
         help='name of a robot, or path of a robot folder (with a slash, e.g. ./my_arm)',
@@ -112,17 +112,17 @@ def _xacro_arg(text: str) -> tuple[str, str]:
 
 
 def robots_epilog() -> str:
-    """Name the robots that are installed, for the help."""
+    """Return a help text that lists the installed robots."""
     with contextlib.suppress(RobotError):
         return 'robots: ' + ', '.join(robot_names(installed_robots_folder()))
     return ''
 
 
 def locate(arguments: argparse.Namespace) -> Robot:
-    """Find the robot that :func:`add_robot` parsed, which overrides the robot folder.
+    """Find the robot given by the arguments of :func:`add_robot`, which override its folder.
 
     Raises:
-        RobotError: There is none; the message lists those that exist.
+        RobotError: The robot does not exist; the message lists those that exist.
     """
     folder = Path() if os.sep in arguments.robot else installed_robots_folder()
     robot = find_robot(arguments.robot, folder)
@@ -140,17 +140,17 @@ def locate(arguments: argparse.Namespace) -> Robot:
 
 
 def no_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
-    """Make no parameter files; for :func:`session`."""
+    """Write no parameter files; a default for :func:`session`."""
     del robot, folder, ros
     return ()
 
 
 @contextlib.contextmanager
 def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
-    """Hold a bus, as long as the block runs; in simulation ``auto`` is one that nothing else has.
+    """Lock a bus while the block runs; in simulation, ``auto`` selects an unused bus.
 
     Raises:
-        StartError: Another bring-up is on it.
+        StartError: Another bring-up uses the bus.
     """
     from canopen_core.can import AUTO, auto_names, resolve_name
 
@@ -161,7 +161,7 @@ def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
 
 
 def _first_free(names: Iterator[str], stack: contextlib.ExitStack) -> str:
-    """Hold the first bus that no other bring-up has; if all are taken, name who has the first."""
+    """Lock the first unused bus; if all are in use, report the user of the first."""
     name = next(names)
     try:
         stack.enter_context(exclusive(f'bus {name}', BUS_REMEDY))
@@ -185,15 +185,15 @@ def session(
     master_files: Callable[[Robot, Path, RosOptions], Sequence[Path]] = no_files,
     plan: bool = False,
 ) -> Iterator[Session]:
-    """Prepare a bring-up; the bus and the namespace are its own as long as the block runs.
+    """Prepare a bring-up, with exclusive bus and namespace while the block runs.
 
-    Args as in :class:`Stack`; ``master_files`` makes files in a folder that lasts as long.
+    Args as in :class:`Stack`; ``master_files`` writes files to a folder that exists as long.
 
     Raises:
-        RobotError: Its bus.yml is wrong.
-        DescriptionError: Its xacro file cannot be expanded.
-        StartError: An executable or a network is missing, or another bring-up is on this bus or
-            in this namespace of the domain.
+        RobotError: The robot's bus.yml is invalid.
+        DescriptionError: The robot's xacro file cannot be expanded.
+        StartError: An executable or a network is missing, or another bring-up uses this bus or
+            this namespace in the ROS domain.
     """
     apply_network(arguments)
     config = read_bus(robot)
@@ -227,28 +227,28 @@ def session(
 
 
 MASTER = Executable('arm_canopen', 'master')
-"""What runs the bus unless something else is asked for."""
+"""Default program that runs the bus."""
 MOTION_NODE = Executable('arm_servo', 'motion_node')
-"""Trajectories and jogging: with the master in it, or for drives that another process has."""
+"""Program for trajectories and jogging, with a built-in master or for drives elsewhere."""
 PLANNER = Executable('arm_planning', 'move_group')
-"""Motions among obstacles, for clients of MoveIt."""
+"""Program that plans motions among obstacles, for clients of MoveIt."""
 SLAVES = Executable('canopen_sim', 'fake_slaves')  # simulated drives
 
 MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
-"""Order of stopping: the master disables the drives, so they must still be there."""
+"""Stop order: the master before the simulated drives, which it disables."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """What is to be brought up."""
+    """Configuration of the processes of a bring-up."""
 
     robot: Robot
     bus: str  # name of the CAN bus
     simulate: bool  # with simulated slaves for all devices of the bus
     start_positions: Mapping[str, float] = field(default_factory=dict)  # if not 0, [rad or m]
-    ready_timeout: float = 30.0  # of each process in [s]
+    ready_timeout: float = 30.0  # for each process in [s]
     master: Executable = MASTER  # what runs the bus
     master_parameters: Mapping[str, str] = field(default_factory=dict)  # beside the usual ones
     master_files: Sequence[Path] = ()  # with parameters, beside the usual one
@@ -258,7 +258,7 @@ class Stack:
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Return the processes that make an arm; they start side by side."""
+    """Return the processes of an arm, which start in parallel."""
     make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
     bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
     own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
@@ -275,7 +275,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
             parameters=files,
             stop_order=MASTER_FIRST,
         ),
-        state_publisher(  # without it the arm moves without TF
+        state_publisher(  # without it there is no TF of the arm
             parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
         ),
     ]
@@ -295,7 +295,7 @@ def controller_process(
     find: FindExecutable,
     ros: RosOptions,
 ) -> ProcessSpec:
-    """Return the process that moves drives of another process; that one makes /tf, too."""
+    """Return the process that moves drives of another process, which also publishes /tf."""
     return node_process(
         'controller',
         MOTION_NODE,
@@ -309,7 +309,7 @@ def controller_process(
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
-    """Choose what runs the bus; return why it offers no motion, too: empty when it does."""
+    """Choose the program that runs the bus; return it, and why it offers no motion, if so."""
     if find(MOTION_NODE.package, MOTION_NODE.name) is None:
         return MASTER, MAKE_MOVE
     if robot.lacking:
@@ -318,5 +318,5 @@ def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
 
 
 def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
-    """Return the services that enable drives; each group is called side by side, one by one."""
+    """Return the services that enable drives, as groups: parallel within, one after another."""
     return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]

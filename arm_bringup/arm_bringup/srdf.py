@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_planning srdf``: the SRDF of a robot, made or refreshed, with a report."""
+"""``ros2 run arm_planning srdf``: create or update the SRDF of a robot, with a report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from process_supervisor import USAGE_ERROR
 from .robots import BringupError, expand_xacro, read_description, read_semantic
 from .session import add_robot, locate, robots_epilog
 
-MIN_SAMPLES = 1000  # poses at least: with fewer, `never` would say nothing
+MIN_SAMPLES = 1000  # least number of poses; with fewer, `never` would be unreliable
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -42,7 +42,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the SRDF; return 0, or 2 when there is no such robot or it cannot be used."""
+    """Create or update the SRDF; return 0, or 2 if the robot is missing or unusable."""
     from arm_model import ArmError, load_limits
     from arm_planning import make_srdf, SRDF_SAMPLES
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the files of the example arm of arm_model from robots/panda: its xacro becomes a URDF.
 
-Run it after a change of that folder, with the packages on the path:
+Run it after changes in that folder, with the packages on the Python path:
 ``python3 tools/make_example_arm.py``.
 """
 
@@ -21,7 +21,7 @@ SOURCE = Path(__file__).parents[1] / 'robots' / 'panda'
 
 
 def contents() -> Mapping[Path, str]:
-    """Return what stands in each file."""
+    """Return the content of each file."""
     urdf, srdf, limits = example_files()
     return {
         urdf: BANNER.sub(NOTE, expand_xacro(SOURCE / 'panda.urdf.xacro'), count=1),

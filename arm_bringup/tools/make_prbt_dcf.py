@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes robots/prbt/prbt_0_1.dcf: the simulated drive's EDS with defaults for the PRBT's units.
+"""Generate robots/prbt/prbt_0_1.dcf: the simulated drive's EDS with defaults in PRBT units.
 
 Run it again when arm_canopen/eds/cia402_drive.eds has changed::
 
@@ -38,10 +38,10 @@ HEADER = """\
 
 
 def derive(text: str) -> str:
-    """Return the DCF for the text of the EDS.
+    """Convert the text of the EDS to the DCF.
 
     Raises:
-        ValueError: An object that gets another default is not in the EDS.
+        ValueError: An object whose default must change is not in the EDS.
     """
     text = re.sub(
         r'; A simulated CiA 402 drive.*?\n(?=\n)', HEADER, text, count=1, flags=re.DOTALL

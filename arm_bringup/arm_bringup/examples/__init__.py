@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demos of an arm, one readable program each: clients of public topics, services and actions.
+"""Demos of an arm: one readable program each, a client of public topics, services and actions.
 
 :mod:`.wave` streams targets to drives, :mod:`.motion` jogs and sends trajectories, :mod:`.plan`
-picks and places by move_group; :mod:`.arm` is what they share.
+picks and places with move_group; :mod:`.arm` contains the shared code.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..session import MAKE_MOVE
 
 
 def motion_demo(argv: Sequence[str] | None = None) -> int:
-    """Run :mod:`.motion` where arm_servo, which arm_bringup does without, is built."""
+    """Run :mod:`.motion` if arm_servo, an optional dependency, is built."""
     if find_spec('arm_servo') is None:
         sys.stderr.write(f'{MAKE_MOVE}\n')
         return USAGE_ERROR
@@ -28,7 +28,7 @@ def motion_demo(argv: Sequence[str] | None = None) -> int:
 
 
 def plan_demo(argv: Sequence[str] | None = None) -> int:
-    """Run :mod:`.plan` where arm_servo and arm_planning are built."""
+    """Run :mod:`.plan` if arm_servo and arm_planning are built."""
     needed = ('arm_servo', 'arm_planning')
     if missing := [name for name in needed if find_spec(name) is None]:
         sys.stderr.write(f'build {" and ".join(missing)} (make build) for planned motions\n')

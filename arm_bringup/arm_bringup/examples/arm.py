@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demos of an arm share: command line, bring-up, enabling, table of drives, goals."""
+"""Shared code of the arm demos: command line, bring-up, enabling, table of drives, goals."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ from ..session import (
 
 ANSWER_TIMEOUT = 30.0  # longest time for an answer in [s]
 QUEUE = 5
-"""States of the arm that wait: a demo which a busy computer holds up misses some, and sees where
-the arm is now."""
+"""Queue depth for states of the arm: on a busy computer a demo drops old states, and sees the
+present one."""
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
 ENABLED = 'Operation enabled'  # title of the state in which a drive can move (CiA 402-2, figure 4)
@@ -67,11 +67,11 @@ STATE_STYLES = {
 
 
 class EndRequested(Exception):  # noqa: N818  # it is no error: the user asked for the end
-    """The user asked for the end."""
+    """The user requested the end of the demo."""
 
 
 def number(values: Mapping[str, str], key: str) -> float:
-    """Read a number of /diagnostics; what is missing or is none becomes NaN."""
+    """Read a number of /diagnostics; return NaN if it is missing or invalid."""
     try:
         return float(values[key].split()[0])
     except (KeyError, ValueError, IndexError):
@@ -79,17 +79,17 @@ def number(values: Mapping[str, str], key: str) -> float:
 
 
 def known(value: float, digits: int = 0) -> str:
-    """Write a number; what is unknown as a dash."""
+    """Format a number; an unknown one as a dash."""
     return f'{value:.{digits}f}' if math.isfinite(value) else '-'
 
 
 class ArmDemo(Demo[ServiceClient]):
-    """A demo on simulated drives: enables them, and shows what /diagnostics has of them."""
+    """Base of demos on simulated drives: enables them, and shows their /diagnostics."""
 
     opening = 'booting'
     widest = WIDE
-    beside = ''  # what runs beside the drives, for the title
-    label = ''  # what the demo's own line in the table begins with
+    beside = ''  # additional nodes, for the title
+    label = ''  # label of the demo's own line in the table
 
     def __init__(
         self,
@@ -99,10 +99,10 @@ class ArmDemo(Demo[ServiceClient]):
         commands: Sequence[str],
         enabled: Sequence[str] = (),
     ) -> None:
-        """Prepare; nothing happens yet.
+        """Store the settings, without starting the demo.
 
-        It runs for a duration in [s], or until Ctrl-C, on the joints that have a drive, with their
-        limits; all of these drives are enabled, or those that are named.
+        The demo runs for ``duration`` in [s], or until Ctrl-C if None. ``limits`` are those of
+        the joints with a drive. It enables the drives ``enabled``, or all drives if empty.
         """
         title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}{self.beside}'
         super().__init__(title, commands)
@@ -121,14 +121,14 @@ class ArmDemo(Demo[ServiceClient]):
 
     @abstractmethod
     def move(self) -> None:
-        """Move the enabled arm, bring it to rest, and leave the result."""
+        """Move the enabled arm, bring it to rest, and store the result."""
 
     def services(self) -> Sequence[str]:
-        """Return services of drives that are called beside those that enable them."""
+        """Return drive services that the demo calls in addition to those for enabling."""
         return ()
 
     def line(self) -> str:
-        """Return the demo's own line, below the bus."""
+        """Return the demo's own line in the table, below the bus."""
         return ''
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
@@ -142,7 +142,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.client.prepare([*itertools.chain(*self._enabling), *self.services()])
 
     def perform(self) -> None:
-        """Enable the drives, and move."""
+        """Enable the drives, and run :meth:`move`."""
         self.enter('enabling')
         for services in self._enabling:
             self.client.call(services, ENABLE_TIMEOUT)
@@ -150,7 +150,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.move()
 
     def take(self, message: DiagnosticArray) -> None:
-        """Keep what a message says of drives and bus; statuses of others are passed over."""
+        """Store the statuses of drives and bus from a message; ignore all others."""
         for status in message.status:
             source, _, part = status.name.partition(': ')
             values = {each.key: each.value for each in status.values}
@@ -161,7 +161,7 @@ class ArmDemo(Demo[ServiceClient]):
                 self.observe(source)
 
     def observe(self, drive: str) -> None:  # a demo may need the latest only
-        """Handle new figures of a drive."""
+        """Handle new diagnostics of a drive."""
 
     def is_online(self, name: str) -> bool:
         """Return whether a drive is online."""
@@ -173,11 +173,11 @@ class ArmDemo(Demo[ServiceClient]):
 
     @property
     def missed(self) -> int:
-        """Synchronous PDOs that did not come in their cycle."""
+        """Number of synchronous PDOs that did not arrive in their cycle."""
         return self.count('missed_pdos')
 
     def count(self, key: str) -> int:
-        """Return a count of the bus; 0 before there is one."""
+        """Return a counter of the bus; 0 before the first diagnostics."""
         value = number(self.bus, key)
         return int(value) if math.isfinite(value) else 0
 
@@ -196,17 +196,17 @@ class ArmDemo(Demo[ServiceClient]):
         return '; '.join(filter(None, (self.line(), self.bus_line())))
 
     def add(self, name: str, figures: str, problem: str = '') -> None:
-        """Add a part to the summary, and what went wrong in it."""
+        """Add a part and its problem, if any, to the summary."""
         self.rows.append((name, figures))
         if problem:
             self.problem(name, problem)
 
     def problem(self, name: str, text: str) -> None:
-        """Add what went wrong in a part."""
+        """Record a problem in a part."""
         self.found.append(f'{name}: {text}')
 
     def repeat(self, begin: Callable[[], None], run: Callable[[], None]) -> None:
-        """Run parts until the time is over, once at least; after a problem or Ctrl-C no more."""
+        """Call ``begin``, then ``run`` at least once, until time is up, a problem or Ctrl-C."""
         try:
             end = time.monotonic() + self.duration
             begin()
@@ -215,7 +215,7 @@ class ArmDemo(Demo[ServiceClient]):
                 run()
                 now = time.monotonic()
                 if now + (now - lap) > end or self.found:
-                    return  # another one would take longer, or hide what went wrong
+                    return  # another run would exceed the time, or hide the problem
                 self.rows.clear()
         except CallError as error:
             self.found.append(str(error))
@@ -232,7 +232,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.warnings = [*self.bus_warnings(), *self.warnings]
 
     def bus_warnings(self) -> list[str]:
-        """Return what is worth a look although the demo went well."""
+        """Return warnings about the bus that do not fail the demo."""
         found = []
         if lost := self.count('frames_lost'):
             found.append(f'{lost} frames were lost: this host was too busy to read them in time')
@@ -242,21 +242,21 @@ class ArmDemo(Demo[ServiceClient]):
         return found
 
     def look(self) -> None:
-        """Draw a picture; end what goes on where the user asked for it.
+        """Refresh the table.
 
         Raises:
-            EndRequested: The user did.
+            EndRequested: The user requested the end.
         """
         self.show()
         if self.left:
             raise EndRequested
 
     def wait_moving(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something that is given up at Ctrl-C.
+        """Wait for a condition while the table is refreshed.
 
         Raises:
-            EndRequested: The user asked for the end.
-            CallError: It did not come within the timeout in [s].
+            EndRequested: The user requested the end.
+            CallError: The condition was not met within the timeout in [s].
         """
 
         def reached() -> bool:
@@ -266,7 +266,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.client.wait_until(reached, timeout, what)
 
     def pause(self, duration: float) -> None:
-        """Wait for a time in [s]."""
+        """Wait for a duration in [s] while the table is refreshed."""
         end = time.monotonic() + duration
         self.wait_moving(lambda: time.monotonic() >= end, math.inf, 'a pause')
 
@@ -290,7 +290,7 @@ class ArmDemo(Demo[ServiceClient]):
             *((name, 8, True) for name in ('position', 'velocity', 'error')),
             *(more if wide else ()),
         )
-        table.columns[0].max_width = max(12, width - 66 - 45 * wide)  # names are cut, no numbers
+        table.columns[0].max_width = max(12, width - 66 - 45 * wide)  # truncate names, not numbers
         for name, limits in self.limits.items():
             drive, moves = self.drives.get(name, {}), name in self.moved
             state, figures = drive.get('state', ''), ('position', 'velocity', 'following_error')
@@ -308,7 +308,7 @@ class ArmDemo(Demo[ServiceClient]):
 
 
 def _gauge(position: float, limits: JointRange) -> Text:
-    """Show where a joint is between its limits; outside of them the mark is red, at the end."""
+    """Draw the joint position between its limits; outside, the mark is red, at the end."""
     span = limits.upper - limits.lower
     if not math.isfinite(span) or not math.isfinite(position):
         return Text('')
@@ -320,7 +320,7 @@ def _gauge(position: float, limits: JointRange) -> Text:
 
 
 class ActionRun:
-    """A goal on its way; ``feedback`` is what the server has sent so far."""
+    """A sent action goal; ``feedback`` collects the feedback received so far."""
 
     def __init__(
         self,
@@ -329,11 +329,11 @@ class ActionRun:
         goal: Any,  # noqa: ANN401  # goals have no type
         name: str,
     ) -> None:
-        """Send it, and wait until it is accepted.
+        """Send the goal, and wait until it is accepted.
 
         Raises:
-            CallError: It was not accepted, or no server answers.
-            GivenUpError: It is no longer wanted.
+            CallError: The goal was rejected, or no server answers.
+            GivenUpError: The user gave up.
         """
         self.feedback: list[Any] = []
         self._client, self._name = client, name
@@ -348,36 +348,36 @@ class ActionRun:
 
     @property
     def done(self) -> bool:
-        """Whether it has ended."""
+        """Whether the goal has ended."""
         return bool(self._result.done())
 
     @property
     def status(self) -> int:
-        """The action_msgs/GoalStatus it ended with, once it is done."""
+        """The final action_msgs/GoalStatus, once the goal has ended."""
         return int(self._result.result().status)
 
     @property
     def result(self) -> Any:  # noqa: ANN401
-        """Its result, once it is done."""
+        """The result, once the goal has ended."""
         return self._result.result().result
 
     def cancel(self) -> None:
-        """Cancel it, and wait for its end."""
+        """Cancel the goal, and wait for its end."""
         answer = self._handle.cancel_goal_async()
         self._client.wait_until(answer.done, ANSWER_TIMEOUT, f'the cancel of {self._name}')
         self._client.wait_until(lambda: self.done, ANSWER_TIMEOUT, 'the end of the canceled')
 
 
 MakeFiles = Callable[..., Sequence[Path]]
-"""Makes the parameter files of motion nodes: of a robot, in a folder, for nodes and groups."""
+"""Writes parameter files of motion nodes, from robot, folder, ROS options and groups."""
 MakeDemo = Callable[[Session, Mapping[str, JointRange], float | None, MovedGroups], ArmDemo]
-"""Makes a demo for a prepared arm, its joints with a drive, its duration and its moved groups."""
+"""Creates a demo from the session, limits of joints with a drive, duration and moved groups."""
 
 
 def parse(
     argv: Sequence[str], name: str, description: str, duration: str
 ) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line of a demo; ``description`` and ``duration`` are texts of the help."""
+    """Parse the command line of a demo; ``description`` and ``duration`` are help texts."""
     parser = argparse.ArgumentParser(
         prog=f'ros2 run arm_bringup {name}',
         description=description,
@@ -401,15 +401,15 @@ def run(
     endless: bool = False,
     errors: tuple[type[Exception], ...] = (),
 ) -> int:
-    """Bring a simulated arm up, and run a demo until its end or Ctrl-C.
+    """Bring up a simulated arm, and run a demo until its end or Ctrl-C.
 
     Args:
-        files: Makes the parameter files of motion nodes; None for a demo of drives.
-        endless: The table runs until Ctrl-C, without a summary.
-        errors: What is raised besides, where a robot does not suit the demo.
+        files: Writes the parameter files of motion nodes; None for a demo of drives only.
+        endless: Whether the table runs until Ctrl-C, without a summary.
+        errors: Further exceptions raised if a robot does not suit the demo.
 
     Returns:
-        0 when all went well, 1 when something did not, 2 when nothing was started.
+        0 on success, 1 if something failed, 2 if nothing was started.
     """
     arguments, ros = parsed
     unsuited: tuple[type[Exception], ...] = (BringupError, SupervisorError, *errors)

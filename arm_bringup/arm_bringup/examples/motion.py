@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_bringup motion_demo``: a simulated arm is jogged and follows trajectories.
+"""``ros2 run arm_bringup motion_demo``: jog a simulated arm, and run trajectories on it.
 
-Joint vectors are in model order in [rad], the tool is the tip link of the first group in its base.
+Joint vectors are in model order in [rad]; tool positions are of the first group's tip in its base.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from .arm import ActionRun, ArmDemo, number, parse, QUEUE, run
 RATE = 100.0  # rate of the controller's states in [Hz]
 JOG_PERIOD = 0.02  # time between two jog commands in [s]
 LATE_COMMANDS = 0.05
-"""Time between two jog commands in [s] from which on the tool may stop in between: each counts
-for 0.1 s, of which its way to the servo takes some."""
+"""Time in [s] between two jog commands above which the tool may stop in between: a command is
+valid for 0.1 s, less its latency."""
 SETTLE = 0.35  # least pause after a motion in [s]
 MOTION_TIMEOUT = 60.0  # longest time of a trajectory in [s]
 
@@ -50,31 +50,31 @@ SIDE, SPEED = 0.08, 0.1  # side of a square in [m], and speed of the tool on it 
 SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))  # directions of the sides of a square
 
 OUTWARDS, DOWN, FAST = 0.866, 0.5, 0.2
-"""Way to the singular pose: shares of outwards and down, and its speed in [m/s]."""
+"""Motion to the singular pose: outward and downward components, and speed in [m/s]."""
 STUCK, LONGEST = 0.05, 6.0
-"""Speed in [m/s] below which the tool has come to its end there, and the longest time in [s]; the
-way back may take twice as long."""
+"""Speed in [m/s] below which the tool has reached the end of this motion, and its longest time in
+[s]; the motion back may take twice as long."""
 
 WAYS = (0.5, 0.25, 0.1)
-"""How far joints go in a trajectory in [rad] or [m], the first that is free."""
+"""Joint motions of a trajectory in [rad] or [m]; the first one without collision is used."""
 LIMIT_SHARE, VELOCITY_SHARE, SHORTEST, CANCELED = 0.6, 0.35, 1.5, 5.0
-"""Share of the limits of acceleration and jerk, and of speed, that a trajectory uses (a drive that
-waits for a busy computer must not lose its path), its shortest time in [s], and that of one which
-is canceled: on a busy computer the cancel takes a second."""
+"""Shares of the acceleration and jerk limits and of the speed limits for a trajectory (so that a
+drive does not lose its path on a busy computer); its least duration in [s], and that of the
+canceled one, since canceling takes a second on a busy computer."""
 SLOW = 0.3  # speed override
 
 WORST_LINE, WORST_SPEED = 3e-3, 0.01
-"""Greatest distance of the tool from the line that it is jogged along in [m], and difference of
-its speed from the asked one as a share."""
+"""Greatest tool distance in [m] from the line of a jog, and relative difference from the commanded
+speed."""
 LEAST_WAY, LEAST_RETURN = 1e-3, 0.9
-"""Way of the tool outwards in [m] below which it does not go there at all, and the share of it
-that it must come back from the singular pose."""
+"""Least outward tool motion in [m] for a valid test, and the share of this motion by which the
+tool must come back from the singular pose."""
 WORST_PATH = 5e-3  # greatest distance of a set-point from the path of a trajectory in [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One state of the trajectory controller; set-points unless they are called measured."""
+    """One controller state; values are set-points unless their name says measured."""
 
     time: float  # time of its cycle in [s]
     position: Array
@@ -86,7 +86,7 @@ class Sample:
 
 
 class Motion(ArmDemo):
-    """Squares, a singular pose, a trajectory with override, one that is canceled."""
+    """Demo: squares, a singular pose, a trajectory with speed override, a canceled one."""
 
     label = 'motion'
 
@@ -111,8 +111,8 @@ class Motion(ArmDemo):
         self.pose = start_pose(self.model)
         self.moved = {*self.model.joints}
         self.samples: list[Sample] = []
-        self.status = ''  # what the servo said last
-        self.limited: list[str] = []  # what it said while something limited the motion
+        self.status = ''  # last status message of the servo
+        self.limited: list[str] = []  # status messages while the motion was limited
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
         """Join the ROS graph: twists and an override out, states of controller and servo in."""
@@ -129,13 +129,13 @@ class Motion(ArmDemo):
         return client
 
     def line(self) -> str:
-        """Return what moves the arm."""
+        """Return a line that says what moves the arm."""
         speed = tool_speed(self.samples[-2:], self.period)
         override = 100 * self.samples[-1].speed if self.samples else 100
         return f'tool {speed:.3f} m/s   override {override:.0f} %   {self.status}'
 
     def move(self) -> None:
-        """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
+        """Run the parts until time is up; at Ctrl-C cancel the current goal."""
         self.repeat(lambda: None, self._parts)
         self._sum_up()
         self.conclude()
@@ -151,7 +151,7 @@ class Motion(ArmDemo):
 
     @property
     def last(self) -> Sample:
-        """The latest state."""
+        """The latest controller state."""
         if not self.samples:
             raise CallError('the trajectory controller publishes no state: is the arm enabled?')
         return self.samples[-1]
@@ -182,7 +182,7 @@ class Motion(ArmDemo):
             commanded = max(commanded, off_line(tools, begin.tool, direction))
             measured = max(measured, off_line(seen, begin.measured_tool, direction))
         reached = max(speeds, key=lambda each: abs(each - SPEED))
-        # PDOs of drives that came late: joints of different times are not where the tool is
+        # late PDOs: joint positions of different times give a wrong tool position
         worst = commanded if self.missed > missed else measured
         limited = (self.limited or [''])[-1]
         figures = (
@@ -205,7 +205,7 @@ class Motion(ArmDemo):
         self.add(f'square, {name}', figures, problem)
 
     def singularity(self) -> None:
-        """Jog the tool outwards until the arm is straight, or something else ends it, and back."""
+        """Jog the tool outwards until the arm is straight or otherwise limited, and back."""
         self.enter('into the straight arm, and back')
         begin, first = self.last.tool, len(self.samples)
         ahead = np.array([begin[0], begin[1], 0.0])
@@ -225,7 +225,7 @@ class Motion(ArmDemo):
         self._rest()
         back, problem = reached - out(), ''
         if reached < LEAST_WAY and text:
-            self.add('singularity', f'left out: {text}')  # an arm of few joints leads no line
+            self.add('singularity', f'left out: {text}')  # too few joints to follow a line
             return
         if reached < LEAST_WAY or back < LEAST_RETURN * reached:
             why = text or 'no reason given'
@@ -234,7 +234,7 @@ class Motion(ArmDemo):
         self.add('singularity', figures, problem)
 
     def trajectory(self) -> None:
-        """Follow a trajectory, at 30 % in its middle."""
+        """Follow a trajectory, with the speed override at 30 % in its middle."""
         self.enter('a trajectory, at 30 % in its middle')
         begin, end, nominal, first = self._plan()
         goal = self._send(end, nominal)
@@ -259,7 +259,7 @@ class Motion(ArmDemo):
         self.add('trajectory', figures, problem)
 
     def cancel(self) -> None:
-        """Cancel a trajectory in its middle: it comes to rest on its path."""
+        """Cancel a trajectory in its middle; the arm must come to rest on the path."""
         self.enter('a trajectory, canceled')
         begin, end, nominal, first = self._plan()
         goal = self._send(end, max(nominal, CANCELED))
@@ -281,7 +281,7 @@ class Motion(ArmDemo):
         self.add('cancel', figures, problem)
 
     def _sum_up(self) -> None:
-        """Add what was measured all the time."""
+        """Add bus and loop statistics of the whole demo to the summary."""
         if self.samples:
             self.add('bus and loop', self.bus_line())
         late = number(self.bus, 'jitter_p99')
@@ -292,7 +292,7 @@ class Motion(ArmDemo):
     def _jog(
         self, linear: Array, frame: str, longest: float, done: Callable[[], bool] | None = None
     ) -> float:
-        """Jog for a time, or until it is done; return the longest time between commands in [s]."""
+        """Jog for ``longest`` [s] or until ``done``; return the longest command gap in [s]."""
         begun = last = time.monotonic()
         gap = 0.0
         while (elapsed := time.monotonic() - begun) < longest:
@@ -315,18 +315,18 @@ class Motion(ArmDemo):
         self._twist.publish(message)
 
     def _stuck(self) -> bool:
-        """Return whether the tool has hardly moved lately."""
+        """Return whether the tool has stopped, judged by the last ``SETTLE`` seconds."""
         recent = self.samples[-round(SETTLE / self.period) :]
         return float(np.linalg.norm(recent[-1].tool - recent[0].tool)) < STUCK * SETTLE
 
     def _plan(self) -> tuple[Array, Array, float, int]:
-        """Return begin, end, time and number of the first sample of a trajectory from here."""
+        """Return start, end, duration in [s] and first sample number of a trajectory from here."""
         begin = self.last.position
         end = free_end(self.model, begin)
         return begin, end, duration_of(self.model, begin, end), len(self.samples)
 
     def _send(self, end: Array, nominal: float) -> ActionRun:
-        """Send a trajectory to a pose, at rest there, and wait until it is accepted."""
+        """Send a trajectory that ends at rest in a pose, and wait until it is accepted."""
         rest = [0.0] * len(end)
         point = JointTrajectoryPoint(positions=end.tolist(), velocities=rest, accelerations=rest)
         point.time_from_start.sec = int(nominal)
@@ -344,7 +344,7 @@ class Motion(ArmDemo):
         self._rest()
 
     def _reach(self, goal: ActionRun, begin: Array, end: Array, share: float) -> None:
-        """Wait until a share of the way is done: times say little on a computer that is busy."""
+        """Wait until a share of the motion is done; on a busy computer time does not show that."""
         way = end - begin
 
         def there() -> bool:
@@ -353,7 +353,7 @@ class Motion(ArmDemo):
         self.wait_moving(there, MOTION_TIMEOUT, f'{100 * share:.0f} % of a trajectory')
 
     def _rest(self) -> None:
-        """Wait until the arm rests, and what is known of it is new."""
+        """Wait until the arm rests according to recent states."""
         self.pause(SETTLE)
         asked = 1e-9 * self.client.node.get_clock().now().nanoseconds
 
@@ -390,7 +390,7 @@ def _why(goal: ActionRun) -> str:
 
 
 def tool_speed(samples: Sequence[Sample], period: float) -> float:
-    """Return the median speed of the commanded tool in [m/s]; 0 without two samples."""
+    """Return the median commanded tool speed in [m/s]; 0 for fewer than two samples."""
     speeds = [
         float(np.linalg.norm(after.tool - before.tool)) / (cycles * period)
         for before, after in pairwise(samples)
@@ -400,7 +400,7 @@ def tool_speed(samples: Sequence[Sample], period: float) -> float:
 
 
 def off_line(points: Sequence[Array], begin: Array, direction: Array) -> float:
-    """Return the greatest distance of points of any dimension from a straight line."""
+    """Return the greatest distance of points, of any dimension, from a straight line."""
     unit = direction / np.linalg.norm(direction)
     offsets = [point - begin for point in points]
     return max(
@@ -409,9 +409,9 @@ def off_line(points: Sequence[Array], begin: Array, direction: Array) -> float:
 
 
 def duration_of(model: RobotModel, begin: Array, end: Array) -> float:
-    """Return the time of a quintic from rest to rest that keeps all limits in [s].
+    """Return the duration in [s] of a quintic from rest to rest within all limits.
 
-    Its peaks over unit way and unit time are 15/8, 10/sqrt(3) and 60.
+    Its velocity, acceleration and jerk peaks for unit distance and time: 15/8, 10/sqrt(3), 60.
     """
     way, limits = np.abs(end - begin), model.limits
     needed = (
@@ -423,23 +423,23 @@ def duration_of(model: RobotModel, begin: Array, end: Array) -> float:
 
 
 def is_free(model: RobotModel, begin: Array, end: Array) -> bool:
-    """Return whether no links meet on the straight way, as the controller judges it."""
+    """Return whether the straight joint path is free of collision, as the controller checks."""
     way = end - begin
     contact = PathCheck(model.scene).contact(lambda times: begin + np.outer(times, way), 1.0)
     return contact is None
 
 
 def free_way(model: RobotModel, begin: Array, end: Array) -> list[Array]:
-    """Return the end, or a pose of the SRDF before it that leads around links."""
+    """Return the waypoints to the end: directly, or via an SRDF pose that avoids collision."""
     if not is_free(model, begin, end):
         for via in model.poses.values():
             if is_free(model, begin, via) and is_free(model, via, end):
                 return [via, end]
-    return [end]  # else the controller says which links are in the way
+    return [end]  # else the controller reports the colliding links
 
 
 def free_end(model: RobotModel, begin: Array) -> Array:
-    """Return where a trajectory leads, each joint in the direction in which it has more room."""
+    """Return a trajectory end that moves each joint in the direction with more room."""
     for end in _ends(model, begin):
         if (end != begin).any() and is_free(model, begin, end):
             return end
@@ -457,7 +457,7 @@ def _ends(model: RobotModel, begin: Array) -> Iterator[Array]:
 
 
 def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups) -> Sequence[Path]:
-    """Write the parameter files of the demo: the robot's own, and what the demo relies on."""
+    """Write the parameter files of the demo: the robot's, and parameters the demo requires."""
     controller = controller_names(robot, groups)[groups.names[0]]
     servo = {'command_in_type': 'speed_units', 'scale': {'linear': 1.0}}  # cap [m/s]
     values = {
@@ -471,7 +471,7 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo; as :func:`.wave.main`."""
+    """Run the demo; see :func:`.wave.main`."""
     parsed = parse(
         sys.argv[1:] if argv is None else argv,
         'motion_demo',

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 run arm_bringup plan_demo``: a simulated arm picks and places among obstacles.
 
-A client of MoveIt's move_group as any other, by its public topics, services and actions. Poses are
-in the root link of the description in [m] and [rad].
+The demo is an ordinary client of move_group's public topics, services and actions. Poses are in
+the frame of the description's root link, in [m] and [rad].
 """
 
 from __future__ import annotations
@@ -57,41 +57,41 @@ from ..session import locate, MOTION_NODE, Session
 from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, parse, QUEUE, run
 
 SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5
-"""Shares of the limits at which the arm meets a box, follows lines, moves freely."""
+"""Shares of the limits for motions towards a box, along lines, and in free space."""
 LONG = 15.0
-"""Time in [s] in which a box can appear on a way: an arm of low limits meets it less slowly."""
+"""Motion duration in [s] that lets a box appear in time; a slow arm needs less slowing down."""
 PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
-"""Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
+"""Longest time in [s] for planning (the default of MoveGroupInterface), and for IK."""
 JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
-"""Tolerances of goals as MoveGroupInterface has them in [rad], [m] and [rad]."""
+"""Goal tolerances in [rad], [m] and [rad], the defaults of MoveGroupInterface."""
 START_TIMEOUT, MOTION_TIMEOUT, SETTLE_TIMEOUT = 60.0, 120.0, 5.0
-"""Longest time in [s] until move_group has received joint states, since DDS takes long on a busy
-computer, of a motion, and until what happened is seen."""
+"""Longest times in [s]: until move_group has received joint states (DDS is slow on a busy
+computer), for a motion, and until its result is seen."""
 DURATION_MARGIN = 20.0  # how much longer than planned a motion may take on a busy computer in [s]
 WORST_JOINT, WORST_PLACE, STILL = 5e-3, 2e-3, 1e-2
-"""Farthest that a joint may stand from its goal in [rad] or [m], that a tool or the part may be
-from theirs in [m], and that joints move of an arm that was refused a motion in [rad] or [m]."""
+"""Greatest distances: of a joint from its goal in [rad] or [m], of the tool or part from its goal
+in [m], and of a joint's motion in [rad] or [m] after a refused goal."""
 EARLY, CHOSEN = 0.15, 0.25
-"""Shares of the way after which a box appears, and after which the arm is still clear of it."""
+"""Shares of the path after which a box appears, and at which the arm is still clear of it."""
 AT_REST, REST_STATES, SHORT_REST_STATES = 5e-4, 16, 4
-"""An arm rests whose joints move less than so far in [rad] or [m], in so many joint states; what
-is planned anew while a motion goes on may follow the rest within a tenth of a second."""
+"""An arm rests if its joints move less than this in [rad] or [m] over this number of joint states;
+the last number is for replanning, which may move the arm again within 0.1 s."""
 EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
-"""Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
-where on a path it appears; and its least distance from both ends, as a share of the reach."""
-LEAST_TURN = 1.0  # how far a joint must turn for a box to have room on its way in [rad]
+"""Edges of a blocking box as shares of the arm's reach, of which the largest possible is used; its
+positions on a path; and its least distance from both ends, as a share of the reach."""
+LEAST_TURN = 1.0  # least joint motion that leaves room for a box on the path in [rad]
 LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
-"""Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; turn
-of the first joint in [rad] or [m]; and the distance beyond which all count as this in [m]."""
+"""Least assumed reach in [m]; least tip motion to a pose as a share of the reach; motion of the
+first joint in [rad] or [m]; and the cap of measured distances in [m]."""
 GAP, APPROACH = 0.003, 0.1
-"""Room below the part in [m]; straight approach and retreat as a share of the reach."""
+"""Gap below the part in [m]; length of approach and retreat as a share of the reach."""
 PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
-WITH_GRIPPER = '_hand'  # what follows the name of a robot in that of its folder with a gripper
+WITH_GRIPPER = '_hand'  # suffix of robot folders with a gripper
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Where an arm picks and places: a table around its first axis, a pillar in the middle."""
+    """Work cell for pick and place: a table, with a pillar between two places."""
 
     group: str
     reach: float  # reach of the arm in [m]; table, pillar and wall are shares of it
@@ -102,28 +102,28 @@ class Cell:
     turn: float  # turn of the tip against the part in [rad]
     touch_links: tuple[str, ...]  # links that the part may touch while it is held
     above: tuple[tuple[float, ...], tuple[float, ...]]
-    """Joint positions near which the straight approach to each of the two places begins."""
-    aside: tuple[str, float]  # joint, and its position, of a pose on whose way a box can appear
+    """Seed joint positions for the start of the straight approach to each of the two places."""
+    aside: tuple[str, float]  # joint and position of a goal on whose path a box can appear
     gripper: tuple[str, str, float, float] | None = None
-    """Group and joint of the gripper, and where it is open and closed; None without."""
+    """Group and joint of the gripper, its open and closed positions; None without gripper."""
 
     def at(self, spread: float, height: float, further: float = 0.0) -> tuple[float, ...]:
-        """Return x, y, z and yaw at an angle from the pillar, on a height above the table."""
+        """Return x, y, z and yaw at an angle from the pillar and a height above the table."""
         direction, radius, top = self.centre
         angle, radius = direction + spread, radius + further
         return radius * math.cos(angle), radius * math.sin(angle), top + height, angle
 
     def part_at(self, place: int) -> tuple[float, ...]:
-        """Return where the part is at one of the two places: x, y, z and yaw."""
+        """Return x, y, z and yaw of the part at one of the two places."""
         return self.at((0.6, -0.6)[place], GAP + self.part[2] / 2)
 
     def tip_at(self, place: int, lifted: float = 0.0) -> Pose:
-        """Return where the tip takes the part up, or the same lifted."""
+        """Return the tip pose for gripping the part, raised by ``lifted`` in [m]."""
         x, y, z, yaw = self.part_at(place)
         return downwards(x, y, z + self.below + lifted, yaw + self.turn)
 
     def obstacles(self) -> list[CollisionObject]:
-        """Return table, pillar and wall."""
+        """Return the collision objects: table, pillar and wall."""
         thin, wide, deep, tall, thick = (
             share * self.reach for share in (0.03, 1.3, 0.5, 0.3, 0.06)
         )
@@ -173,13 +173,13 @@ CELLS = {
         aside=('joint_1_s', 1.5),
     ),
 }
-"""Cells of the robots here, by their folder."""
+"""Cells of the robots in this package, by robot folder."""
 
 
 class Plan(ArmDemo):
-    """Pick, place, a box in the way, a blocked goal; without a cell the box alone.
+    """Demo: pick, place, a box in the way, a blocked goal; without a cell only the box.
 
-    What move_group or the gripper refuses, or does not do in time, is a CallError.
+    A refusal or timeout of move_group or the gripper raises CallError.
     """
 
     beside = ', and move_group'
@@ -219,13 +219,13 @@ class Plan(ArmDemo):
         self.positions: dict[str, float] = {}
         self.states = 0  # how many joint states have come
         self.paths: list[DisplayTrajectory] = []
-        self.scene = PlanningScene()  # as viewers are shown it
+        self.scene = PlanningScene()  # the scene as viewers receive it
         self.planning_times: list[float] = []
         self.text = ''
         self._place = 0  # where the part is
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
-        """Join the ROS graph as a client of move_group does, and as a viewer."""
+        """Join the ROS graph as a client of move_group and as a viewer."""
         client = super().join(given_up)
         node = client.node
         self._move = GoalClient(node, MoveGroup, 'move_action')
@@ -241,12 +241,12 @@ class Plan(ArmDemo):
         return client
 
     def line(self) -> str:
-        """Return what was planned last."""
+        """Return a line about the last plan."""
         planned = f'planned in {_ms(self.planning_times[-1])}   ' if self.planning_times else ''
         return planned + self.text
 
     def move(self) -> None:
-        """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
+        """Run the parts until time is up; at Ctrl-C cancel the current goal."""
         self.repeat(self._begin, self._parts)
         planned = 'nothing was planned'
         if times := self.planning_times:
@@ -287,7 +287,7 @@ class Plan(ArmDemo):
         self.enter('home, by free motion')
         self._go('home', home, FREE)
         joint, place = cell.aside
-        if abs(place - home[joint]) < LEAST_TURN:  # a robot of others that begins elsewhere
+        if abs(place - home[joint]) < LEAST_TURN:  # a user's robot with another start pose
             place = -place
         self._meet({**home, joint: place})
         pillar, grasp = cell.at(0.0, 0.15 * cell.reach), cell.tip_at(source)
@@ -343,12 +343,12 @@ class Plan(ArmDemo):
         )
 
     def _go_above(self, name: str, cell: Cell, place: int) -> float:
-        """Move freely to where a straight approach begins: what compute_ik finds for it."""
+        """Move in free space to the start of a straight approach, found by compute_ik."""
         above = cell.tip_at(place, APPROACH * cell.reach)
         return self._go(name, self._solve(above, cell.above[place], free=True), FREE)
 
     def _meet(self, target: Mapping[str, float], speed: float = SLOW) -> None:
-        """Put a box in the way of a motion: the arm stops, and reaches the goal around it."""
+        """Place a box in the path of a motion; the arm must stop, then reach the goal past it."""
         name = 'box in the way'
         self.enter('slowly on, until a box appears in the way')
         shown = len(self.paths)
@@ -392,7 +392,7 @@ class Plan(ArmDemo):
         self._change(CollisionObject(id=VISITOR, operation=CollisionObject.REMOVE))
 
     def _go_there_and_back(self) -> None:
-        """Move to the farthest pose that is known, and back around a box."""
+        """Move to the farthest known pose, and back around a box."""
         limits, turn = self.model.limits, TURN * np.eye(len(self.home))[0]
         turned = [np.clip(self.home + way, limits.lower, limits.upper) for way in (turn, -turn)]
         poses = [
@@ -415,7 +415,7 @@ class Plan(ArmDemo):
         self._meet(self._joints(self.home), float(np.clip(FREE * lasted / LONG, SLOW, FREE)))
 
     def _refused(self, name: str, target: Mapping[str, float], obstacle: str) -> None:
-        """Judge a goal that is in contact: it is refused, the obstacle is named, nothing moves."""
+        """Check that a goal in collision is refused by naming the obstacle, without motion."""
         self.enter('a goal that is blocked')
         before = self._here()
         goal = self._attempt(target)
@@ -432,7 +432,7 @@ class Plan(ArmDemo):
         self.add(name, f'{code}: {message}')
 
     def _go(self, name: str, target: Mapping[str, float] | Pose, speed: float) -> float:
-        """Move to joints freely, to a pose along a line; return the planning time in [s]."""
+        """Move to joint positions freely, or to a pose on a line; return planning time in [s]."""
         return self._finish(name, self._send(target, speed), target)
 
     def _finish(self, name: str, goal: ActionRun, target: Mapping[str, float] | Pose) -> float:
@@ -440,13 +440,13 @@ class Plan(ArmDemo):
         return self._judge(name, goal, target)
 
     def _attempt(self, target: Mapping[str, float]) -> ActionRun:
-        """Move freely, and wait for the end of that, whatever it is."""
+        """Move in free space, and wait for the end, whether success or failure."""
         goal = self._send(target, FREE)
         self.wait_moving(lambda: goal.done, MOTION_TIMEOUT, 'the end of a motion')
         return goal
 
     def _judge(self, name: str, goal: ActionRun, target: Mapping[str, float] | Pose) -> float:
-        """Judge the end of a motion: where the joints are seen, and whether something touches."""
+        """Check the end of a motion: measured joint positions, and contact."""
         if (code := code_of(goal)) != 'SUCCESS':
             raise CallError(f'{name}: {code}: {goal.result.error_code.message}')
         planning_time = float(goal.result.planning_time)
@@ -471,14 +471,14 @@ class Plan(ArmDemo):
         return planning_time
 
     def _arrives(self, name: str, off: Callable[[], float], worst: float, unit: str) -> None:
-        """Judge where something comes to rest within some seconds."""
+        """Check that an error ``off`` falls below ``worst`` within some seconds."""
         with contextlib.suppress(CallError):
             self.wait_moving(lambda: off() <= worst, SETTLE_TIMEOUT, 'it')
         if not off() <= worst:
             self.problem(name, f'{1e3 * off():.1f} m{unit} from its goal')
 
     def _rest(self, goal: ActionRun | None = None) -> float:
-        """Wait until no joint moves, or a motion has ended; return when one moved last in [s]."""
+        """Wait until no joint moves or a goal has ended; return when a joint moved last in [s]."""
         enough = SHORT_REST_STATES if goal else REST_STATES
         last, moved, states = self._here(), time.monotonic(), self.states
 
@@ -493,14 +493,14 @@ class Plan(ArmDemo):
         return moved
 
     def _here(self) -> Array:
-        """Return where the joints of the arm were seen last."""
+        """Return the last received joint positions of the arm."""
         return np.array([self.positions[joint] for joint in self.model.joints])
 
     def _joints(self, positions: Array) -> dict[str, float]:
         return dict(zip(self.model.joints, positions.tolist(), strict=True))
 
     def _rows(self, path: DisplayTrajectory) -> list[Array]:
-        """Return positions of the arm on a path."""
+        """Return the joint positions of the arm along a path."""
         rows = []
         for each in path.trajectory:
             names = list(each.joint_trajectory.joint_names)
@@ -531,7 +531,7 @@ class Plan(ArmDemo):
         return self.goal
 
     def _solve(self, pose: Pose, seed: Sequence[float], *, free: bool) -> dict[str, float]:
-        """Return joint positions for a pose of the tip, near others; whether nothing may touch."""
+        """Solve IK for a tip pose near ``seed``; ``free`` excludes solutions in collision."""
         request = GetPositionIK.Request()
         wanted = request.ik_request
         wanted.group_name, wanted.ik_link_name = self.group, self.model.tip
@@ -551,7 +551,7 @@ class Plan(ArmDemo):
         return {joint: places[joint] for joint in self.model.joints}
 
     def _grip(self, position: float) -> None:
-        """Move the gripper, and wait until it is there."""
+        """Move the gripper, and wait until it has reached the position."""
         goal, name = GripperCommand.Goal(), self.gripper_action
         goal.command.position = position
         grip = ActionRun(self.client, self._gripper, goal, name)
@@ -561,7 +561,7 @@ class Plan(ArmDemo):
             raise CallError(f'{name}: {position:.4f} was not reached: {where:.4f}')
 
     def _add(self, *things: CollisionObject) -> None:
-        """Put things into the scene, and wait until viewers are shown them."""
+        """Add objects to the scene, and wait until viewers receive them."""
         self._change(*things)
         names = {each.id for each in things}
         self.wait_moving(
@@ -605,7 +605,7 @@ def _ms(duration: float) -> str:
 
 
 def code_of(goal: ActionRun) -> str:
-    """Return MoveIt's code of the end of a motion by its name."""
+    """Return the name of MoveIt's error code of an ended goal."""
     value = goal.result.error_code.val
     try:
         return PlanningCode(value).name
@@ -614,7 +614,7 @@ def code_of(goal: ActionRun) -> str:
 
 
 def joint_goal(joints: Mapping[str, float]) -> Constraints:
-    """Return the goal that joints are at positions."""
+    """Return goal constraints for joint positions."""
     return Constraints(
         joint_constraints=[
             JointConstraint(
@@ -630,7 +630,7 @@ def joint_goal(joints: Mapping[str, float]) -> Constraints:
 
 
 def pose_goal(frame: str, link: str, pose: Pose) -> Constraints:
-    """Return the goal that a link is at a pose."""
+    """Return goal constraints for the pose of a link."""
     place = PositionConstraint(link_name=link, weight=1.0)
     turn = OrientationConstraint(link_name=link, weight=1.0, orientation=pose.orientation)
     place.header.frame_id = turn.header.frame_id = frame
@@ -650,7 +650,7 @@ def downwards(x: float, y: float, z: float, yaw: float) -> Pose:
 
 
 def box(name: str, edges: Sequence[float], place: Sequence[float]) -> CollisionObject:
-    """Return a box with its middle at a place: x, y, z and yaw."""
+    """Return a box centred at a place given as x, y, z and yaw."""
     x, y, z, yaw = place
     message = CollisionObject(id=name, operation=CollisionObject.ADD)
     turn = Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
@@ -672,7 +672,7 @@ def distance_of(model: RobotModel, thing: CollisionObject, positions: Array) -> 
 
 
 def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | None:
-    """Return a box into which an arm would run on its way, clear of both ends of that."""
+    """Return a box in an arm's path, clear of both ends of it; None if there is no room."""
     reach = max(model.reach, LEAST_REACH)
     for edge, share in product(EDGES, SHARES):
         at = rows[int(share * (len(rows) - 1))]
@@ -685,10 +685,10 @@ def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | Non
 
 
 def with_gripper(arguments: argparse.Namespace) -> Robot:
-    """Find the robot; of one that is asked for by name, its folder with a gripper if there is one.
+    """Find the robot; for a robot given by name, prefer its folder with a gripper.
 
     Raises:
-        RobotError: There is no such robot.
+        RobotError: The robot does not exist.
     """
     robot = locate(arguments)
     if os.sep not in arguments.robot:
@@ -700,7 +700,7 @@ def with_gripper(arguments: argparse.Namespace) -> Robot:
 
 
 def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups) -> Sequence[Path]:
-    """Write the parameter files of the demo: those of a bring-up, and time for a busy computer."""
+    """Write the parameter files of a bring-up, with longer time limits for a busy computer."""
     execution = {'allowed_goal_duration_margin': DURATION_MARGIN}
     values = {'move_group': {'ros__parameters': {'trajectory_execution': execution}}}
     path = folder / 'demo.yaml'
@@ -710,7 +710,7 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo; as :func:`.wave.main`."""
+    """Run the demo; see :func:`.wave.main`."""
     parsed = parse(
         sys.argv[1:] if argv is None else argv,
         'plan_demo',

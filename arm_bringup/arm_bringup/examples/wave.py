@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_bringup demo``: a simulated arm boots, enables and waves.
+"""``ros2 run arm_bringup demo``: a simulated arm boots, is enabled and waves.
 
-Every joint swings about the middle of its range, each a little later than the last. The demo
-streams targets to the drives, as any client may. A drive that something else stops or moves
-refuses the stream from then on.
+Every joint swings about the middle of its range, each a little later than the previous one. The
+demo streams targets to the drives, as any client can. If another client stops or moves a drive,
+the drive refuses the stream from then on.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .arm import ArmDemo, known, number, parse, run
 SWING_TIME = 5.0  # time of one swing in [s]
 OMEGA = 2 * math.pi / SWING_TIME  # angular velocity of the wave in [rad/s]
 AMPLITUDE, RANGE_SHARE = 0.45, 0.5
-"""Greatest amplitude in [rad] or [m]; the swing covers at most this share of a joint's range."""
+"""Greatest amplitude in [rad] or [m], and greatest share of a joint's range for the swing."""
 VELOCITY_SHARE, MAX_VELOCITY = 0.6, 1.2
-"""Greatest speed: as a share of a joint's limit, and in [rad/s] or [m/s], since drives approach
-their targets at that speed or less and some URDFs have limits of thousands."""
+"""Greatest speed, as a share of a joint's limit, and in [rad/s] or [m/s]: drives approach targets
+at most at that speed, and some URDFs have limits of thousands."""
 SHORTEST_ENTRY = 2.0  # a joint takes at least this long to enter in [s]
 PERIOD = 0.04  # time between two targets of a drive in [s]
 LEAST_SHARE = 0.2  # a joint that moved less than this share of its amplitude did not wave
@@ -41,14 +41,14 @@ HALT_TIMEOUT = 10.0  # longest time in [s] for the drives to come to rest
 
 
 def quintic_step(x: float) -> float:
-    """Go from 0 at x <= 0 to 1 at x >= 1 with two continuous derivatives; its slope is <= 15/8."""
+    """Return a step from 0 at x <= 0 to 1 at x >= 1, twice differentiable, with slope <= 15/8."""
     x = min(max(x, 0.0), 1.0)
     return min(x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0)  # rounding may pass 1
 
 
 @dataclass
 class Axis:
-    """One drive: its swing, and how well it follows.
+    """Swing of one drive, and statistics of its path error.
 
     Positions are in [rad] or [m], times on the steady clock in [s].
     """
@@ -57,21 +57,21 @@ class Axis:
     phase: float  # how far it is ahead in [rad]
     centre: float = field(init=False)
     amplitude: float = field(init=False)
-    velocity: float = field(init=False)  # that it never exceeds
+    velocity: float = field(init=False)  # greatest speed
     lowest: float = math.inf
     highest: float = -math.inf
     error_max: float = 0.0
-    squares: float = 0.0  # of the path error
+    squares: float = 0.0  # sum of squared path errors
     samples: int = 0
     _start: float = math.nan
     _entered: float = math.nan
     _entry_time: float = SHORTEST_ENTRY
 
     def __post_init__(self) -> None:
-        """Choose centre and amplitude within the limits; without a range it swings about zero.
+        """Choose centre and amplitude within the limits; an unlimited joint swings about zero.
 
         Raises:
-            WaveError: The joint has no range, or may not move.
+            WaveError: The joint has no room to move, or its speed limit is zero.
         """
         lower, upper, velocity = self.limits.lower, self.limits.upper, self.limits.velocity
         if not upper > lower or not velocity > 0:
@@ -86,11 +86,11 @@ class Axis:
 
     @property
     def active(self) -> bool:
-        """It is in the wave."""
+        """Whether the drive takes part in the wave."""
         return math.isfinite(self._start)
 
     def enter(self, position: float, now: float) -> None:
-        """Begin the wave from where the joint stands."""
+        """Start the wave from the given position."""
         way = abs(self.centre - position) + self.amplitude
         spare = self.velocity - self.amplitude * OMEGA
         self._entry_time = max(SHORTEST_ENTRY, way * 15 / 8 / spare)
@@ -98,7 +98,7 @@ class Axis:
         self._start = position  # the last one: the sender begins by it
 
     def target(self, now: float) -> float:
-        """Return where it is to be.
+        """Return the target position at time ``now``.
 
         With the quintic step r and an entry of time T, p(t) = start + r(t/T) (centre +
         A sin(omega t + phase) - start) begins at rest, is twice continuously differentiable, and
@@ -110,24 +110,24 @@ class Axis:
         return self._start + share * (swing - self._start)
 
     def measure(self, position: float, error: float) -> None:
-        """Take what /diagnostics has of position and path error."""
+        """Record position and path error from /diagnostics."""
         self.lowest, self.highest = min(self.lowest, position), max(self.highest, position)
         self.error_max = max(error, self.error_max)
         self.squares, self.samples = self.squares + error * error, self.samples + 1
 
     @property
     def moved(self) -> float:
-        """Range of its positions; 0 before there is one."""
+        """Range of the recorded positions; 0 without any."""
         return max(self.highest - self.lowest, 0.0) if self.samples else 0.0
 
     @property
     def error_rms(self) -> float:
-        """Root mean square of the path error."""
+        """Root mean square of the recorded path errors."""
         return math.sqrt(self.squares / self.samples) if self.samples else math.nan
 
 
 class Wave(ArmDemo):
-    """Streams targets to the drives until the time is over or Ctrl-C."""
+    """Demo: streams targets to the drives until time is up or Ctrl-C."""
 
     def __init__(
         self,
@@ -154,7 +154,7 @@ class Wave(ArmDemo):
         return [f'{name}/halt' for name in self.axes]
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
-        """Join the ROS graph, and begin to send."""
+        """Join the ROS graph, and start sending targets."""
         client = super().join(given_up)
         self._publishers = {
             name: client.node.create_publisher(Float64, f'{name}/target', 1) for name in self.axes
@@ -175,13 +175,13 @@ class Wave(ArmDemo):
         self.client.call(halts, HALT_TIMEOUT)
 
     def stopping(self) -> None:
-        """Send nothing more."""
+        """Stop sending targets."""
         self.moved = set()
         self._ended.set()
         self._sender.join()
 
     def observe(self, drive: str) -> None:
-        """See how a drive is; one that is enabled enters the wave from where it stands."""
+        """Read the state of a drive; an enabled one starts the wave from its present position."""
         position = number(self.drives[drive], 'position')
         if drive not in self.moved or not self.is_enabled(drive) or math.isnan(position):
             return
@@ -197,7 +197,7 @@ class Wave(ArmDemo):
         return f'{self._enabled_text()}, {self.bus_line()}, path error {1e3 * worst:.1f} mrad'
 
     def _send(self) -> None:
-        """Send to one drive after the other: many messages at a time would hold up their cycle."""
+        """Send to one drive at a time: a burst of messages would delay the cycle of the drives."""
         pause = PERIOD / len(self.axes)
         for name, axis in itertools.cycle(self.axes.items()):
             if self._ended.wait(pause):
@@ -210,7 +210,7 @@ class Wave(ArmDemo):
         return f'{sum(map(self.is_enabled, self.axes))}/{len(self.axes)} joints enabled'
 
     def _judge(self, duration: float) -> None:
-        """Sum up, and say which joints were not enabled or did not move."""
+        """Summarise, and report joints that were not enabled or did not move."""
         width = max(len('joint'), *map(len, self.axes))
         head = f'{"joint":<{width}}  {"from":>8}  {"to":>8}  {"moved":>11}'
         rows = [f'{head}  {"path error max":>15}  {"rms":>6}']
@@ -235,10 +235,10 @@ class Wave(ArmDemo):
 
 
 def waving_joints(robot: Robot, drives: Sequence[str], joints: Collection[str]) -> list[str]:
-    """Return the joints that wave: those of the groups that are asked for, else all with a drive.
+    """Return the joints that wave: those of the requested groups, else all joints with a drive.
 
     Raises:
-        RobotError: There is no such group.
+        RobotError: A group does not exist.
         WaveError: No drive has the name of a joint.
     """
     waving: Collection[str] = drives
@@ -254,7 +254,7 @@ def waving_joints(robot: Robot, drives: Sequence[str], joints: Collection[str]) 
 
 
 def commands(arm: Session) -> list[str]:
-    """Return commands to try in a second terminal."""
+    """Return suggested commands for a second terminal."""
     call, drive = 'ros2 service call', arm.ros.resolve(arm.drives[0])
     bus_config = os.path.relpath(arm.robot.bus_config)
     return [
@@ -266,10 +266,10 @@ def commands(arm: Session) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo until its end or Ctrl-C; the command line is that of the process by default.
+    """Run the demo until its end or Ctrl-C; ``argv`` defaults to the process's command line.
 
     Returns:
-        0 when all went well, 1 when something did not, 2 when nothing was started.
+        0 on success, 1 if something failed, 2 if nothing was started.
     """
     parsed = parse(
         sys.argv[1:] if argv is None else argv,
