@@ -250,8 +250,8 @@ class Stack:
     start_positions: Mapping[str, float] = field(default_factory=dict)  # if not 0, [rad or m]
     ready_timeout: float = 30.0  # for each process in [s]
     master: Executable = MASTER  # what runs the bus
-    master_parameters: Mapping[str, str] = field(default_factory=dict)  # beside the usual ones
-    master_files: Sequence[Path] = ()  # with parameters, beside the usual one
+    master_parameters: Mapping[str, str] = field(default_factory=dict)  # additional parameters
+    master_files: Sequence[Path] = ()  # additional parameter files
     ros: RosOptions = field(default_factory=RosOptions)  # of all nodes
     plan: bool = False  # with move_group, which has the files of the master
     view: bool = False  # with the page on which the robot is seen

@@ -76,8 +76,8 @@ class TrajectoryGoal:
     joints: Sequence[str]  # joint names, in the order of the points' values
     points: Sequence[GoalPoint]  # its points
     age: float = 0.0  # time since its start in [s]; 0 starts now, negative starts later
-    path_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances on the way, by joint
-    goal_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances at the end, by joint
+    path_tolerance: Mapping[str, JointTolerance] | None = None  # path tolerances by joint
+    goal_tolerance: Mapping[str, JointTolerance] | None = None  # goal tolerances by joint
     # time to reach the goal within tolerance after the end in [s]; 0 is the default
     goal_time: float = 0.0
 

@@ -17,7 +17,7 @@ import numpy as np
 from arm_model import ArmError, Array, frozen, RobotState
 from arm_trajectory import GoalCode, GoalError, OnlineTrajectoryGenerator, Plan
 
-HALTED = 0.005  # share of the asked speed below which a limit counts as none left
+HALTED = 0.005  # share of the commanded speed below which a motion counts as halted
 
 
 class Cause(Enum):
@@ -36,11 +36,11 @@ class Cause(Enum):
 class Limiter:
     """One cause that limits a motion."""
 
-    cause: Cause  # its kind
-    name: str  # what it is: a joint, two links, an axis of the tool
-    # way left in [rad] or [m], speed asked in [rad/s], or measure of the singularity
+    cause: Cause  # kind of limit
+    name: str  # limiting object: a joint, two links, an axis of the tool
+    # remaining distance in [rad] or [m], required speed in [rad/s], or measure of the singularity
     amount: float
-    factor: float  # what it leaves of the asked speed, 0 to 1
+    factor: float  # remaining share of the commanded speed, 0 to 1
 
     def __str__(self) -> str:
         """Describe it in a few words."""
@@ -59,7 +59,7 @@ class Limiter:
 class MotionReport:
     """How much of a commanded speed is achieved, and what limits it."""
 
-    factor: float = 1.0  # achieved share of the asked speed; 1 when nothing limits it
+    factor: float = 1.0  # achieved share of the commanded speed; 1 without limiters
     limiters: tuple[Limiter, ...] = ()  # what limits it, the strongest first
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class Outcome:
 
     code: GoalCode  # code of the action's result
     reason: str  # why, in words
-    canceled: bool = False  # whether it was asked to end
+    canceled: bool = False  # whether a client canceled it
 
 
 CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
@@ -144,8 +144,8 @@ class ArmState:
     measured: RobotState  # what the drives report
     now: float  # time of the cycle
     speed_scaling: float  # share of the speed of trajectories and targets; 0 in a pause
-    is_paused: bool  # whether jogging comes to rest in spite of a command
-    is_held: bool  # whether a jog or a target comes to rest, and goes on after that
+    is_paused: bool  # whether a pause overrides jog commands
+    is_held: bool  # whether a jog or a target is held at rest, to resume later
 
 
 class Controller(ABC):
@@ -155,7 +155,7 @@ class Controller(ABC):
     outcome: Outcome | None = None  # how it ended; None while it goes on
     report = MotionReport()  # what limits its last step
     on_path = False  # whether its last step is on a path that was checked for collisions
-    brakes = True  # whether it may still bring the arm to rest out of another motion
+    brakes = True  # whether it may still be stopping the arm from another motion
 
     @abstractmethod
     def update(self, arm: ArmState, period: float) -> RobotState | None:
@@ -174,7 +174,7 @@ class Controller(ABC):
         self.outcome = self.outcome or outcome
 
 
-ARRIVAL_TOLERANCE = 1e-6  # how near to the target the set-points must be to have arrived in [rad]
+ARRIVAL_TOLERANCE = 1e-6  # distance of set-points to the target that counts as arrived in [rad]
 MIN_SPEED_FACTOR = 0.01  # least share of the speed that a target is approached with
 
 

@@ -24,7 +24,7 @@ NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
 RELEASED_SPEED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speeds in [m/s] and [rad/s] below which a released axis is held again."""
 
-MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while held axes are off
+MIN_COMMAND_FACTOR = 0.1  # least executed share of a command while held axes are off
 
 SLOWED, HASTENED = 0.1, 0.4
 """Least times in [s] in which the executed share of a command falls to 0 and recovers."""
@@ -44,7 +44,7 @@ class TwistCommand:
     """A commanded twist of the tool."""
 
     twist: Array  # linear [m/s], then angular [rad/s] (6), turning about the tip
-    # link along whose axes the twist is given, and follows it; the base when None
+    # link whose axes the twist is given in and follows; None is the base
     link: str | None = None
     axes: Array | None = None  # rotation (3, 3) from other axes to the base, in place of a link
 
@@ -54,7 +54,7 @@ class JointCommand:
     """Commanded joint speeds."""
 
     velocity: Array  # speeds in [rad/s], in the order of the joints
-    commanded: Mask  # mask of the joints that are commanded; the others are held
+    commanded: Mask  # mask of the commanded joints; the others are held
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +62,8 @@ class PoseCommand:
     """A target pose of the tip, tracked if it moves."""
 
     pose: Pose  # pose of the tip in the base
-    linear_speed: float = 0.4  # greatest speed of the tip on the way there in [m/s]
-    angular_speed: float = 0.8  # greatest angular speed of the tip on the way there in [rad/s]
+    linear_speed: float = 0.4  # greatest speed of the tip in [m/s]
+    angular_speed: float = 0.8  # greatest angular speed of the tip in [rad/s]
 
 
 Command = TwistCommand | JointCommand | PoseCommand
@@ -73,8 +73,8 @@ Command = TwistCommand | JointCommand | PoseCommand
 class ServoSettings:
     """Settings of jogging."""
 
-    hold: float = 8.0  # how fast held axes come back, per error, in [1/s]
-    approach: float = 4.0  # how fast a pose is approached at the end, per distance, in [1/s]
+    hold: float = 8.0  # gain of correcting held axes in [1/s]
+    approach: float = 4.0  # gain of the final approach to a pose in [1/s]
     linear_deceleration: float = 0.5  # deceleration towards a pose in [m/s2]
     angular_deceleration: float = 1.5  # angular deceleration towards a pose in [rad/s2]
     path_error: float = 5e-4  # error of held axes at which the command is slowed down in [m]

@@ -35,7 +35,7 @@ MIN_SINGULAR_VALUE = 0.004
 REGULAR_SINGULAR_VALUE = 0.4
 """Singular value of the scaled Jacobian above which a direction is never damped."""
 
-LOST_SPEED_FACTOR = 0.5  # share of the asked speed below which a direction counts as lost
+LOST_SPEED_FACTOR = 0.5  # share of the commanded speed below which a direction counts as lost
 DIFFERENCE_STEP = 1e-3  # step of finite differences in [rad]
 MIN_SPEED = 1e-6  # speed that counts as zero in [rad/s]
 MIN_CURVATURE = 0.02  # least curvature of a way out, in scaled tool speed per squared joint speed
@@ -183,7 +183,7 @@ class WayOut:
 
     direction: Array  # unit vector of joint speeds
     speed: float  # how fast to go along it in [rad/s]
-    weight: float  # how much that weighs against the asked twist, 0 to 1
+    weight: float  # weight against the commanded twist, 0 to 1
 
 
 class ReachLimit:
@@ -278,7 +278,7 @@ class ReachLimit:
         return 1.0 if self._room(way, position) >= self._room(-way, position) else -1.0
 
     def _room(self, way: Array, position: Array) -> float:
-        """Return the lowest speed at which all joints moved by ``way`` can still stop in time."""
+        """Return the greatest speed from which all joints moved by ``way`` can stop in time."""
         limits = self._limits
         left = np.where(way > 0.0, limits.upper - position, position - limits.lower)
         rows = zip(left, limits.acceleration, limits.jerk, limits.velocity, strict=True)

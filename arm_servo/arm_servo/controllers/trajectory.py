@@ -29,9 +29,9 @@ from arm_trajectory import (
 
 from .controller import ArmState, Controller, Outcome, Source
 
-ARRIVAL_TOLERANCE = 1e-6  # how near to the end the set-points must be to have arrived in [rad]
+ARRIVAL_TOLERANCE = 1e-6  # distance of set-points to the end that counts as arrived in [rad]
 MAX_CATCH_UP_SCALING = 0.7  # speed scaling at most while the arm catches up with the path
-PATH_MET_TOLERANCE = 1e-3  # how near to the path the set-points must be to have met it in [rad]
+PATH_MET_TOLERANCE = 1e-3  # distance of set-points to the path that counts as met in [rad]
 
 PATH_LEFT_TOLERANCE = 0.02
 """Greatest distance in [rad] of the set-points from the path after they have met it."""
@@ -51,9 +51,9 @@ class ExecutionSettings:
     """Settings for accepting and executing trajectories."""
 
     rules: GoalRules = field(default_factory=GoalRules)  # what is accepted
-    # tolerances on the way, by joint or of each; 0 is none
+    # path tolerances, by joint or one for all; 0 is none
     path: DefaultTolerances = field(default_factory=JointTolerance)
-    # tolerances at the end, by joint or of each; 0 is none
+    # goal tolerances, by joint or one for all; 0 is none
     goal: DefaultTolerances = field(default_factory=lambda: JointTolerance(0.0, 0.01))
     # time to come within the goal's tolerance after the end in [s]; 0 is without end
     goal_time: float = 0.0
@@ -64,7 +64,7 @@ class Feedback:
     """Feedback on the execution of a trajectory."""
 
     time: float  # time of the trajectory in [s]
-    desired: RobotState  # what the trajectory says now
+    desired: RobotState  # state of the trajectory now
     actual: RobotState  # what was measured
     timer: TimerState  # how it runs through the trajectory
 
@@ -91,7 +91,7 @@ class Execution(Controller):
         state: RobotState,
         speed_scaling: float,
         settings: ExecutionSettings,
-        wait: float = 0.0,  # how long to wait at rest in [s]; the state is one of rest then
+        wait: float = 0.0,  # wait at rest in [s]; requires a state at rest
     ) -> None:
         """Check a trajectory and plan its path.
 

@@ -35,7 +35,7 @@ ACTIVE_FORCE = 1e-9  # force of a bound above which it counts as pressing
 MIN_DECELERATION_FACTOR = 0.3
 """Least share of its deceleration that a joint uses while slower joints are stopping."""
 
-MIN_APPROACH_CYCLES = 3.0  # least time for the rest of the way to a limit, in cycles
+MIN_APPROACH_CYCLES = 3.0  # least time for the remaining distance to a limit, in cycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +57,14 @@ class VelocityBoundsSettings:
 class Bounds:
     """Joint speed bounds in one state."""
 
-    ways: Sequence[tuple[float, float]]  # left to the lower and upper limits, less the margins
-    # least and greatest speeds that can be braked in front of the limits in [rad/s]
+    ways: Sequence[tuple[float, float]]  # distances to the lower and upper limits, less margins
+    # least and greatest speeds in [rad/s] that can stop before the limits
     brakeable: Sequence[tuple[float, float]]
-    lower: Array  # those, and what can be reached soon, in [rad/s]
-    upper: Array  # those, and what can be reached soon, in [rad/s]
+    lower: Array  # lower bounds, also limited by acceleration, in [rad/s]
+    upper: Array  # upper bounds, also limited by acceleration, in [rad/s]
     near: Sequence[Proximity]  # the nearest pairs of links
-    rows: Array  # their gradients (m, n) in [m/rad]
-    least: Array  # their least changes of distance (m) in [m/s]
+    rows: Array  # gradients of their distances (m, n) in [m/rad]
+    least: Array  # least rates of their distances (m) in [m/s]
 
 
 class VelocityBounds:
@@ -211,7 +211,7 @@ class TwistTask:
     axes: Array  # rotation from the task's axes to the base link (3, 3)
     commanded: Mask  # mask of the axes that the command moves (6)
     drifting: Mask  # mask of the other axes that need not be held (6)
-    # speed that brings the held axes back where they belong (6)
+    # twist that corrects the held axes (6)
     correction: Array = field(default_factory=lambda: np.zeros(6))
 
 

@@ -549,7 +549,7 @@ class CommandGateway:
             self._core.plan(command.request, basis)
         self._check(command.source, command.number)
         if command.takes_drives:
-            # a stream that begins asks first: the cycle may be quicker
+            # check a new stream first: the cycle may be quicker
             self._gate.ask(command.source, command.stream, self._clock())
             if not self.get_ready():
                 self._gate.ask(command.source, command.stream, -math.inf)
@@ -567,7 +567,7 @@ class CommandGateway:
         yield Turn.WORKER
         request = command.request
         if isinstance(request, TrajectoryGoal) and self._needs_rest(request, basis):
-            # a jog cannot be foreseen for so long; a goal that is refused does not stop it
+            # a jog cannot be predicted for so long; a refused goal does not stop it
             here = replace(basis, state=RobotState.at_rest(basis.state.position))
             self._core.plan(_aged(request, cycle.now - command.requested), here)
             cycle = yield from self._wait_for_rest(command)
@@ -624,7 +624,7 @@ class CommandGateway:
         """Return the goal to plan, the basis to plan from, and the steady start time in [s]."""
         if basis.source is not Source.TRAJECTORY:
             self._lag = 0.0
-        if _is_at_rest(basis) and not goal.age:  # it begins whenever it begins
+        if _is_at_rest(basis) and not goal.age:  # it may start at any time
             return goal, basis, cycle.now
         cycles = max(MIN_CYCLES_AHEAD, math.ceil(_preparation_time(goal) / cycle.period) + 1)
         ahead = cycles * cycle.period

@@ -66,7 +66,7 @@ class JogRequest:
 class DisplacementRequest:
     """Move joints by relative amounts; displacements add up during the motion."""
 
-    displacements: Mapping[str, float]  # how far in [rad] by joint
+    displacements: Mapping[str, float]  # relative motions in [rad] by joint
     max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
 
     @property

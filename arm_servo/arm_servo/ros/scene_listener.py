@@ -40,7 +40,7 @@ from .motion_goals import LoggedReasons
 SceneChange = Callable[[Scene, Array], Scene]
 """Computes a new scene from the previous one and the group's joint positions in [rad]."""
 
-MOVING_PERIOD = 0.5  # time between two scenes for a joint beside the group that moves in [s]
+MOVING_PERIOD = 0.5  # time between scene updates for a moving joint outside the group in [s]
 
 PLACE_TOLERANCE = 1e-3
 """Greatest apparent motion of a joint at rest in [rad] or [m], from sensor noise."""
@@ -179,7 +179,7 @@ ANSWER_TIMEOUT = 5.0
 """Time in [s] to wait for a requested whole scene before it is requested again."""
 
 PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
-OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
+OTHERS_TIMEOUT = 5.0  # time to wait for joints outside a group without a warning in [s]
 
 
 class SceneListener:

@@ -35,7 +35,7 @@ from ..core.requests import CommandType, DisplacementRequest, JogRequest, Snapsh
 from .motion_goals import Refusals
 from .servo_commands import CommandConverter, PREFIX, read_scales, ServoParameters, Units
 
-HALTED_SPEED_FACTOR = 0.02  # share of the asked speed below which a motion counts as halted
+HALTED_SPEED_FACTOR = 0.02  # share of the commanded speed below which a motion counts as halted
 
 
 CODES = {
