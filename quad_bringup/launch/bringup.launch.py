@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 launch quad_bringup bringup.launch.py``, where ROS has launch.
+"""``ros2 launch quad_bringup bringup.launch.py``, where ROS provides launch.
 
-It runs ``ros2 run quad_bringup bringup``, which starts, watches and stops the processes, so both
-ways are the same.
+It runs ``ros2 run quad_bringup bringup``, which starts, supervises and stops the processes, so
+both behave the same.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The quadruped brought up with one command, and the demo."""
+"""Bring-up of the quadruped, and the demo."""
 
 __version__ = '0.1.0'

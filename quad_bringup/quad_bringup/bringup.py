@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_bringup bringup``: all processes of a quadruped with one command.
+"""``ros2 run quad_bringup bringup``: starts all processes of a quadruped.
 
-The command line, which the demo and the launch file share in part; the processes that it makes,
-and how they are run. The errors::
+Command line, shared in part with the demo and the launch file; process list; supervision. Errors::
 
     BringupError
-    └── ArgumentError (ValueError)   what was requested cannot be brought up
+    └── ArgumentError (ValueError)   the requested configuration is invalid
 """
 
 from __future__ import annotations
@@ -52,9 +51,9 @@ class BringupError(Exception):
 
 
 class ArgumentError(BringupError, ValueError):
-    """What was requested cannot be brought up.
+    """The requested configuration is invalid.
 
-    Scenarios: a policy or calibration file that is not there, an unknown preset.
+    Scenarios: a missing policy or calibration file, an unknown preset.
     """
 
 
@@ -76,7 +75,7 @@ CONTROLLER = Executable('quad_controller', 'controller_node')
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """What is to be brought up."""
+    """Configuration of a bring-up."""
 
     port: str  # serial port of the robot; with ``simulate`` a link to the simulated one's
     preset: str = 'lite'  # preset of the description
@@ -96,13 +95,13 @@ class Stack:
 
     @property
     def title(self) -> str:
-        """What runs, and where."""
+        """Description of the configuration."""
         arm, simulated = ' with arm' * self.arm, ', simulated,' * self.simulate
         return f'XGO {self.preset}{arm}{simulated} on {self.port}'
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Return the processes that make a quadruped; they start side by side.
+    """Return the processes of a quadruped; they start in parallel.
 
     Raises:
         StartError: An executable is missing.
@@ -226,15 +225,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def session(
     arguments: argparse.Namespace, ros: RosOptions, port: str | None
 ) -> Iterator[tuple[Stack, list[ProcessSpec]]]:
-    """Prepare a bring-up; the port and the namespace are its own as long as the block runs.
+    """Prepare a bring-up; during the block, it owns the port and the namespace.
 
     Args:
-        arguments: What :func:`add_arguments` parsed; ``calibration`` may be there, too.
-        ros: Options of all nodes.
-        port: Serial port of the robot; None for a simulated one.
+        arguments: Parsed arguments of :func:`add_arguments`, optionally with ``calibration``.
+        ros: ROS options for all nodes.
+        port: Serial port of the robot; None for a simulated robot.
 
     Raises:
-        ArgumentError: A file is not there, or the servos of a real robot were chosen.
+        ArgumentError: A file is missing, or a servo model was chosen for a real robot.
         StartError: An executable or a network is missing, or another bring-up is on this port or
             in this namespace of the domain.
     """
@@ -283,7 +282,7 @@ def _servo(model: str | None, port: str | None) -> str | None:
 
 
 def _stiffness(servo: str) -> float:
-    """Return how stiff a servo of the simulation is [N m/rad]."""
+    """Return the stiffness of the simulated servo [N m/rad]."""
     # only here, as it takes a while and most runs choose none
     from quad_sim import parse_servo, SetupError
 
@@ -319,7 +318,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Returns:
-        What was requested, and the options of all nodes.
+        The arguments, and the ROS options for all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup bringup',
@@ -354,10 +353,10 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Bring a quadruped up and stay until it is to go down.
+    """Run a quadruped until it is told to stop.
 
     Returns:
-        0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.
+        0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 if nothing was started.
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
@@ -386,7 +385,7 @@ TRUE, FALSE = 'true', 'false'
 
 
 class LaunchArgument(NamedTuple):
-    """An argument as ``name:=value``."""
+    """A launch argument, ``name:=value``."""
 
     name: str  # with two dashes in front, that of the bring-up's argument
     default: str  # empty to leave it to the bring-up
@@ -413,13 +412,13 @@ LAUNCH_ARGUMENTS = (
 
 
 def argv(values: Mapping[str, str]) -> list[str]:
-    """Make the bring-up's command line.
+    """Convert launch arguments to the bring-up's command line.
 
     Args:
         values: Value of each launch argument.
 
     Returns:
-        Its arguments; those that the bring-up has defaults for are left out when they are empty.
+        The command line; empty arguments with a default in the bring-up are left out.
 
     Raises:
         ArgumentError: A flag is neither true nor false.

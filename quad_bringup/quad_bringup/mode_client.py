@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bring-up asks of the controller: its state, another mode, and to lie down at the end.
+"""The bring-up's client to the controller: reads the state, requests modes, lies down at exit.
 
-The robot lies down before its controller is stopped, or stands still, if it is on its feet.
+A robot on its feet lies down, or stops walking, before its controller is stopped.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STATE_TOPIC = 'controller_node/state'
 
 
 class ModeClient(GraphClient):
-    """A node of its own; use it in one thread."""
+    """Client with its own node; use it in one thread only."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph."""
@@ -36,20 +36,20 @@ class ModeClient(GraphClient):
         self.node.create_subscription(String, STATE_TOPIC, self._take_state, LATCHED)
 
     def set_mode(self, mode: str, timeout: float) -> str:
-        """Ask the controller for a mode; again for a while when it refuses.
+        """Request a mode; retry for a while if the controller rejects it.
 
-        A controller that has just begun may not have received everything that it needs.
+        A controller that has just started may still lack inputs.
 
         Args:
-            mode: One that it knows.
-            timeout: Longest time in [s] for an answer.
+            mode: Mode name.
+            timeout: Time-out for an answer in [s].
 
         Returns:
-            What it answered.
+            The answer of the controller.
 
         Raises:
-            CallError: It refused, or did not answer in time.
-            GivenUpError: It is no longer wanted.
+            CallError: The controller rejected the mode, or did not answer in time.
+            GivenUpError: The user gave up waiting.
         """
         deadline = time.monotonic() + REFUSAL_TIMEOUT
         while True:
@@ -95,13 +95,13 @@ TO_LIE = ON_THE_WAY + LYING
 def leave(
     report: Callable[[str], None], given_up: Callable[[], bool], *, namespace: str, hold: bool
 ) -> None:
-    """Make the robot lie down if it is on its feet; give up on a controller that does not answer.
+    """Make a robot on its feet lie down; give up if the controller does not answer.
 
     Args:
-        report: Takes what happens, in words.
-        given_up: Returns whether the person does not want to wait any longer.
-        namespace: Of the controller.
-        hold: Let the robot end its gait instead, so that it is left standing on all its feet.
+        report: Called with progress messages.
+        given_up: Returns whether the user gave up waiting.
+        namespace: Namespace of the controller.
+        hold: Only end the gait, so that the robot stays standing on all its feet.
     """
     end, what = (_stand_still, 'standing still') if hold else (_lie_down, 'lying down')
     client = ModeClient('quad_bringup', given_up, namespace)
@@ -135,7 +135,7 @@ def _lie_down(client: ModeClient, report: Callable[[str], None]) -> None:
 
 
 def _try_to_lie(client: ModeClient, ends: set[str]) -> str:
-    """Request it, wait for one of some states, and return that."""
+    """Request mode lie; wait for a final state and return it."""
     before = client.state  # a fault of before is no end
     client.set_mode(LYING, LIE_TIMEOUT)
     client.wait_until(lambda: client.state != before, LIE_TIMEOUT, 'it to lie')

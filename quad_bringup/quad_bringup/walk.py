@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 run quad_bringup demo``: a simulated quadruped stands up, walks and lies down.
 
-Commands velocities on /cmd_vel, and compares them with where the simulated body goes and with
-/odom.
+Publishes velocities on /cmd_vel, and compares them with the simulated motion and with /odom.
 """
 
 from __future__ import annotations
@@ -69,11 +68,11 @@ SEGMENTS = (
 
 
 class Track:
-    """Adds up what a body covers in its own frame, from its poses in a fixed one.
+    """Integrates the motion of a body in its own frame, from its poses in a fixed one.
 
     Attributes:
-        way: What it has covered since the first pose.
-        stamp: ROS time of the latest pose in [s]; NaN before there is one.
+        way: Displacement since the first pose.
+        stamp: ROS time of the latest pose in [s]; NaN before the first.
     """
 
     def __init__(self) -> None:
@@ -84,7 +83,7 @@ class Track:
         self._recent: deque[tuple[float, Velocity]] = deque()
 
     def take(self, message: Odometry) -> None:
-        """Record a pose; one that is not newer than the last is ignored."""
+        """Add a pose; ignore one that is not newer than the last."""
         stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         if stamp <= self.stamp:
             return
@@ -107,11 +106,11 @@ class Track:
 
     @property
     def velocity(self) -> Velocity | None:
-        """Mean velocity of the last second; None before there is one."""
+        """Mean velocity of the last second; None without a pose."""
         return self.mean_since(*self._recent[0]) if self._recent else None
 
     def mean_since(self, stamp: float, way: Velocity) -> Velocity | None:
-        """Return the mean velocity since the body had covered a way; None when no time passed."""
+        """Return the mean velocity since an earlier displacement; None if no time passed."""
         time_passed = self.stamp - stamp
         if not time_passed > 0:
             return None
@@ -121,7 +120,7 @@ class Track:
 
 
 class Segment(NamedTuple):
-    """A part of the demo with one velocity, and what came of it."""
+    """A part of the demo with one velocity, and its result."""
 
     name: str
     duration: float
@@ -131,7 +130,7 @@ class Segment(NamedTuple):
 
 
 class Walk(Demo[ModeClient]):
-    """Stand up, walk, turn, strafe, stop, lie down."""
+    """Runs the demo: stand up, walk, turn, strafe, stop, lie down."""
 
     # title, speeds (5), blank, body and loop (2), and one that is left free
     lines = 10
@@ -158,7 +157,7 @@ class Walk(Demo[ModeClient]):
         self.loop: Mapping[str, float] = {}  # how the controller keeps its time [1/s], [s]
 
     def join(self, given_up: Callable[[], bool]) -> ModeClient:
-        """Join the ROS graph: velocities out, everything that the robot reports in."""
+        """Join the ROS graph: publish velocities, subscribe to all reports of the robot."""
         client = ModeClient('demo', given_up, self.namespace)
         node, sensor = client.node, qos_profile_sensor_data
         self._twist = node.create_publisher(Twist, 'cmd_vel', 1)
@@ -196,11 +195,11 @@ class Walk(Demo[ModeClient]):
         self._command(None)
 
     def stopping(self) -> None:
-        """Command nothing more."""
+        """Stop commanding velocities."""
         self._command(None)
 
     def wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something; a fault of the controller ends it."""
+        """Wait for a condition; raise on a fault of the controller."""
 
         def reached() -> bool:
             if self._in_fault:
@@ -211,7 +210,7 @@ class Walk(Demo[ModeClient]):
         super().wait(reached, timeout, what)
 
     def _plan(self) -> Iterator[tuple[str, Velocity, float]]:
-        """Return name, velocity and duration of each segment: one round, or rounds without end."""
+        """Yield name, velocity and duration of each segment: one round, or endless rounds."""
         total = self.duration or USUAL_ROUND
         one_round = [
             (name, velocity.scaled(self.share), part * total) for name, velocity, part in SEGMENTS
@@ -219,7 +218,7 @@ class Walk(Demo[ModeClient]):
         return itertools.cycle(one_round) if self.duration is None else iter(one_round)
 
     def _go(self, name: str, velocity: Velocity, duration: float) -> None:
-        """Command a velocity, and measure what comes of it."""
+        """Command a velocity, and measure the motion."""
         self.enter(name)
         self._command(velocity)
         begin = time.monotonic()
@@ -238,18 +237,18 @@ class Walk(Demo[ModeClient]):
         self.wait(lambda: self.left or time.monotonic() >= end, math.inf, 'the time')
 
     def _reach(self, mode: str, phase: str) -> None:
-        """Request a mode and wait until it is there."""
+        """Request a mode and wait until it is reached."""
         self.enter(phase)
         self.client.set_mode(mode, MODE_TIMEOUT)
         self.wait(lambda: self.state == mode, MODE_TIMEOUT, f'mode {mode}')
 
     def _command(self, velocity: Velocity | None) -> None:
-        """Command a velocity from now on, ten times a second; None is silence."""
+        """Set the velocity to publish ten times a second; None stops publishing."""
         self.commanded = velocity
         self._send()
 
     def _missing(self) -> list[str]:
-        """Return what is needed and not there yet: topics without publisher or subscriber."""
+        """Return the topics that still lack a publisher or subscriber."""
         there = {
             'ground truth of the simulator': math.isfinite(self.truth.stamp),
             '/odom': math.isfinite(self.odometry.stamp),
@@ -260,7 +259,7 @@ class Walk(Demo[ModeClient]):
 
     @property
     def state(self) -> str:
-        """State of the controller, as it calls it; empty before it is received."""
+        """State that the controller reports; empty before the first report."""
         return self.client.state if self.joined else ''
 
     @property
@@ -269,15 +268,15 @@ class Walk(Demo[ModeClient]):
 
     @property
     def rate(self) -> float:
-        """Joint commands per second, as the controller measures them; NaN before it reports."""
+        """Joint commands per second, as reported by the controller; NaN before a report."""
         return self.loop.get('rate', math.nan)
 
     def _jitter(self, percentile: str) -> float:
-        """Return a percentile of the deviations from the period of the loop in [ms]."""
+        """Return a percentile of the deviations from the loop period in [ms]."""
         return 1e3 * self.loop.get(f'jitter_{percentile}', math.nan)
 
     def progress(self) -> str:
-        """Return how it goes."""
+        """Return the present progress."""
         if not self.state or math.isnan(self.rate):
             return 'waiting for the controller'
         return (
@@ -291,7 +290,7 @@ class Walk(Demo[ModeClient]):
         return f'joint commands {self.rate:.1f} Hz, jitter p50/p99 {jitter}'
 
     def _conclude(self) -> None:
-        """Write summary and problems, where something was measured."""
+        """Write summary and problems, if anything was measured."""
         if not self.segments:
             return
         head = f'{"[m/s, rad/s]":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
@@ -317,7 +316,7 @@ class Walk(Demo[ModeClient]):
         self.problems = problems
 
     def table(self, width: int) -> Sequence[RenderableType]:
-        """Draw velocities, body and loop."""
+        """Build the table of velocities, body and loop."""
         del width  # it has the width of the narrowest terminal
         columns = ('commanded', 'in physics', 'by /odom')
         speeds = make_table(('velocity', 16, False), *((name, 16, True) for name in columns))
@@ -361,7 +360,7 @@ class Walk(Demo[ModeClient]):
         self.battery = 100.0 * message.percentage
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        """Keep the errors of the controller, the reason of a fault, and how its loop does."""
+        """Store the controller's errors, fault reason and loop statistics."""
         for status in message.status:
             if not status.name.startswith('controller_node'):
                 continue
@@ -376,7 +375,7 @@ def _rotation(quaternion: Any) -> tuple[float, float, float, float]:  # noqa: AN
 
 
 def wrong_speed(segment: Segment) -> str:
-    """Return what is wrong with the motion of a segment; empty when it was met."""
+    """Return the deviation of a segment's motion as text; empty if within tolerance."""
     name, wanted = segment.name, segment.commanded
     speed = segment.measured or segment.odometry
     if speed is None:
@@ -395,7 +394,7 @@ def wrong_speed(segment: Segment) -> str:
 
 
 def velocity_text(velocity: Velocity | None) -> str:
-    """Write a velocity: forward, left, turn."""
+    """Format a velocity: forward, left, turn."""
     if velocity is None:
         return 'unknown'
     forward, left, turn = _tidy(velocity)
@@ -410,16 +409,16 @@ def _columns(velocity: Velocity | None) -> str:
 
 
 def _tidy(velocity: Velocity) -> tuple[float, float, float]:
-    """Round, and turn a negative zero into zero."""
+    """Round a number, and turn negative zero into zero."""
     forward, left, turn = velocity
     return round(forward, 3) + 0.0, round(left, 3) + 0.0, round(turn, 2) + 0.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo until its end or Ctrl-C; the command line is that of the process by default.
+    """Run the demo to its end or Ctrl-C; by default with the process's command line.
 
     Returns:
-        0 when all went well, 1 when something did not, 2 when nothing was started.
+        0 on success, 1 on a failure, 2 if nothing was started.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup demo',

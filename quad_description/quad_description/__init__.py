@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The XGO quadruped: URDF from its numbers, legs, limits, poses, kinematics; without rclpy.
+"""The XGO quadruped: parametric URDF, limits, poses, leg kinematics; without rclpy.
 
-Where the feet are, and the joints for where they shall be::
+Forward and inverse kinematics::
 
     from quad_description import Pose, pose_positions, quadruped, robot_urdf
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_description display``: the robot's description and joint states to look at."""
+"""``ros2 run quad_description display``: publishes robot description and joint states to view."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ SWEEP_DURATION: Final = 2.5  # [s] for one joint, there and back
 
 
 def sweep(joints: Sequence[Joint], rest: Mapping[str, float], elapsed: float) -> dict[str, float]:
-    """Return the positions [rad] at a time [s] of a sweep, which begins anew after the last joint.
+    """Return the positions [rad] at a time [s] of a sweep through all joints, which repeats.
 
-    The joint whose turn it is goes from its rest position to its upper limit, to its lower limit
-    and back, along a sine each way; the others rest.
+    One joint after another moves from rest to its upper limit, its lower limit and back, along a
+    sine each way; the others rest.
     """
     positions = {joint.name: rest[joint.name] for joint in joints}
     turn, phase = divmod(elapsed / SWEEP_DURATION, 1.0)
@@ -47,15 +47,15 @@ RATES = (1.0, 200.0)  # [Hz]
 
 
 class Display(Node):
-    """Publishes ``/robot_description``, latched, ``/joint_states`` and base_footprint."""
+    """Publishes ``/robot_description`` (latched), ``/joint_states`` and base_footprint."""
 
     @destroyed_when_refused
     def __init__(self) -> None:
-        """Read the parameters and begin to publish.
+        """Read the parameters and start to publish.
 
         Raises:
-            ParameterError: A parameter makes no sense.
-            DescriptionError: The description cannot be made.
+            ParameterError: A parameter is invalid.
+            DescriptionError: The description cannot be generated.
         """
         super().__init__('display')
         read = ParameterReader(self)
@@ -88,7 +88,7 @@ class Display(Node):
         self._tf.publish(TFMessage(transforms=[self._to_footprint(message)]))
 
     def _to_footprint(self, states: JointState) -> TransformStamped:
-        """Return where the ground is below a body that is level and stands on its lowest foot."""
+        """Return the ground position below a level body that stands on its lowest foot."""
         transform = TransformStamped(child_frame_id=f'{self._prefix}base_footprint')
         transform.header.stamp = states.header.stamp
         transform.header.frame_id = f'{self._prefix}base_link'
@@ -97,7 +97,7 @@ class Display(Node):
 
 
 def run(args: list[str] | None = None) -> int:
-    """Display until Ctrl-C; return the exit code."""
+    """Run the display until Ctrl-C; return the exit code."""
     return run_node('display', Display, DescriptionError, args=args)
 
 

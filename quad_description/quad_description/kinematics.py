@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A quadruped: its legs and where their feet are, the order of its joints, limits and weight.
+"""Kinematic model of a quadruped: legs, joint order, limits and weight.
 
-The family of legs is roll - pitch - pitch: the hip turns about the body's x axis, thigh and calf
-about its y axis, at the zero pose. Link shapes may be bent and zeros may be anywhere; what matters
-are two lengths, two angles and an offset to the side, all measured in the zero pose.
+All legs are of the type roll - pitch - pitch: in the zero pose, the hip turns about the body's x
+axis, thigh and calf about its y axis. Link shapes and zero positions are arbitrary; two lengths,
+two angles and a lateral offset, measured in the zero pose, describe the leg.
 
 The kinematics of a leg are in closed form. With the foot at (x, y, z) from the hip point and d
-its offset to the side, the leg's plane is rolled by ``atan2(z, y) - atan2(depth, d)``,
+its lateral offset, the leg's plane is rolled by ``atan2(z, y) - atan2(depth, d)``,
 ``depth = -sqrt(y^2 + z^2 - d^2)``; inside it the law of cosines gives the knee and the angle to
 the target gives the thigh. Plain floats, no arrays: this runs for four legs in every step.
 """
@@ -73,15 +73,15 @@ class LegGeometry:
 
 
 def body_link(tree: KinematicTree) -> str:
-    """Return the link of the body."""
+    """Return the name of the body link."""
     return BASE if BASE in tree.links else tree.root
 
 
 def foot_link(tree: KinematicTree, leg: str) -> str:
-    """Return the link of a foot: ``fl_foot``, or as others call it, ``FL_foot``, ``LF_FOOT``.
+    """Return the name of a foot link: ``fl_foot``, or in other notations ``FL_foot``, ``LF_FOOT``.
 
     Raises:
-        DescriptionError: There is none, or several.
+        DescriptionError: No link or several links match.
     """
     names = [f'{each}_foot' for each in SPELLINGS[leg]]
     found = [link for link in tree.links if link.lower() in names]
@@ -97,8 +97,8 @@ def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
     """Derive the geometry of a leg from the joints between the body and its foot.
 
     Raises:
-        DescriptionError: Other than three turning joints move the foot, an axis points
-            elsewhere, or a length is zero.
+        DescriptionError: The leg does not have exactly three revolute joints, an axis has another
+            direction, or a length is zero.
     """
     body, end = body_link(tree), foot_link(tree, leg)
     joints = [each for each in tree.chain(body, end) if each.kind is not JointKind.FIXED]
@@ -153,14 +153,14 @@ def _sign(axis: Vector, unit: Vector, name: str) -> float:
 
 
 def _in_plane(upper: Vector, lower: Vector) -> tuple[float, float]:
-    """Return length and pitch of a link, seen from the side."""
+    """Return length and pitch of a link in side view."""
     x, z = lower[0] - upper[0], lower[2] - upper[2]
     return math.hypot(x, z), math.atan2(-x, -z)
 
 
 @dataclass(frozen=True, slots=True)
 class LegSolution:
-    """Joint positions for a foot."""
+    """Inverse kinematics solution for a foot."""
 
     angles: Vector  # hip, thigh, calf in [rad], always within the limits
     reachable: bool  # whether they bring the foot to where it was requested
@@ -170,7 +170,7 @@ class LegSolution:
 
 
 def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
-    """Return the joint positions for a foot in the body's frame [m], or the nearest ones."""
+    """Solve the inverse kinematics for a foot in the body's frame [m]; clamp to the reach."""
     hip, one, two = leg.hip, leg.thigh_length, leg.calf_length
     x = foot[0] - hip[0] - leg.thigh_x
     y, z = foot[1] - hip[1], foot[2] - hip[2]
@@ -198,7 +198,7 @@ def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
 
 
 def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
-    """Return the foot's centre in the body's frame [m] by the angles of hip, thigh, calf."""
+    """Return the foot's centre in the body's frame [m] for hip, thigh and calf angles."""
     roll, upper, lower = _pitches(leg, angles)
     x = leg.thigh_x - leg.thigh_length * math.sin(upper) - leg.calf_length * math.sin(lower)
     z = leg.thigh_z - leg.thigh_length * math.cos(upper) - leg.calf_length * math.cos(lower)
@@ -207,7 +207,7 @@ def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
 
 
 def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
-    """Return how calf and foot are turned against the zero pose, in the body's frame."""
+    """Return the rotation of calf and foot from the zero pose, in the body's frame."""
     roll = leg.signs[0] * angles[0] / 2
     pitch = (leg.signs[1] * angles[1] + leg.signs[2] * angles[2]) / 2
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
@@ -215,7 +215,7 @@ def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
 
 
 def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the foot's position [m] by each joint [rad], one column after another."""
+    """Return the derivatives of the foot position [m] by each joint [rad], as columns."""
     roll, upper, lower = _pitches(leg, angles)
     sine, cosine = math.sin(roll), math.cos(roll)
     lower_x = -leg.calf_length * math.cos(lower)
@@ -232,13 +232,13 @@ def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _pitches(leg: LegGeometry, angles: Vector) -> Vector:
-    """Return the roll of the leg's plane, and the pitches of thigh and calf in it."""
+    """Return the roll of the leg's plane, and the pitches of thigh and calf within it."""
     hip, thigh, calf = (sign * angle for sign, angle in zip(leg.signs, angles, strict=True))
     return hip, thigh + leg.thigh_pitch, thigh + calf + leg.calf_pitch
 
 
 def wrapped(angle: float) -> float:
-    """Return the same direction within -pi to pi [rad]."""
+    """Wrap an angle to -pi to pi [rad]."""
     return math.remainder(angle, math.tau)
 
 
@@ -246,9 +246,9 @@ MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
 
 
 def raised_feet(feet: Sequence[Vector]) -> tuple[str, ...]:
-    """Return the feet [m] in the air while the other three stand, whatever their plane.
+    """Return the names of the feet [m] in the air while the other three stand on any plane.
 
-    With one foot or a diagonal pair lifted, the robot rocks: both feet of the diagonal are raised.
+    With one foot or a diagonal pair lifted, the robot rocks, so both feet of the diagonal count.
     """
     raised = []
     for index, link in enumerate(FEET):
@@ -274,7 +274,7 @@ BALANCE_PASSES = 3  # the centre of mass moves with the legs; this many passes s
 
 
 class FootPose(NamedTuple):
-    """Where a foot is."""
+    """Position and rotation of a foot."""
 
     position: Vector  # of its centre in [m]
     # how it is turned against the zero pose, in what the position is given in
@@ -283,7 +283,7 @@ class FootPose(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Quadruped:
-    """A robot."""
+    """Kinematic model of a robot."""
 
     tree: KinematicTree  # what the URDF says
     names: tuple[str, ...]  # commanded joints in the order of the URDF
@@ -308,21 +308,21 @@ class Quadruped:
 
     @property
     def others(self) -> tuple[int, ...]:
-        """Places of the joints that belong to no leg (those of an arm)."""
+        """Indices of the non-leg joints (those of an arm)."""
         taken = {index for indices in self.leg_indices for index in indices}
         return tuple(index for index in range(len(self.names)) if index not in taken)
 
     def rotation_of(self, link: str) -> Quaternion:
-        """Return how a link is turned in the body at zero, (x, y, z, w); an unknown one is not."""
+        """Return a link's rotation in the body at zero, (x, y, z, w); identity if unknown."""
         pose = link_poses(self.tree, {}, body_link(self.tree)).get(link)
         return NO_ROTATION if pose is None else pose.rotation
 
     def leg_angles(self, positions: Sequence[float]) -> list[Vector]:
-        """Return the joint positions of each leg from those of all joints [rad]."""
+        """Return the positions of each leg from those of all joints [rad]."""
         return [(positions[a], positions[b], positions[c]) for a, b, c in self.leg_indices]
 
     def feet(self, positions: Sequence[float]) -> Feet:
-        """Return where the feet are, by joint positions [rad]; those behind the legs may miss."""
+        """Return the foot positions for joint positions [rad]; non-leg joints may be omitted."""
         one, two, three, four = (
             foot_position(leg, angles)
             for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
@@ -330,45 +330,44 @@ class Quadruped:
         return one, two, three, four
 
     def foot_poses(self, positions: Sequence[float]) -> list[FootPose]:
-        """Return where the feet are and how they are turned, as :meth:`feet`."""
+        """Return the foot poses for joint positions; see :meth:`feet`."""
         pairs = zip(self.legs, self.leg_angles(positions), strict=True)
         return [FootPose(foot_position(*pair), calf_rotation(*pair)) for pair in pairs]
 
     def standing_height(self, positions: Sequence[float]) -> float:
-        """Return how high a level base_link is above ground that its lowest foot touches [m]."""
+        """Return the height of a level base_link above its lowest foot's contact point [m]."""
         return self.foot_radius - min(z for _, _, z in self.feet(positions))
 
     def solve(self, feet: Sequence[Vector]) -> list[LegSolution]:
-        """Return the joint positions of each leg for where the feet shall be."""
+        """Solve the inverse kinematics of all legs for foot positions."""
         return [solve(leg, foot) for leg, foot in zip(self.legs, feet, strict=True)]
 
     def place(self, solutions: Sequence[LegSolution], others: Sequence[float]) -> Targets:
-        """Replace the legs' positions among those of all joints."""
+        """Replace the leg positions among those of all joints; return the result."""
         return self.with_legs([solution.angles for solution in solutions], others)
 
     def with_legs(self, angles: Sequence[Vector], others: Sequence[float]) -> Targets:
-        """Do as :meth:`place` with positions of hip, thigh and calf of each leg [rad]."""
+        """Like :meth:`place`, with hip, thigh and calf positions of each leg [rad]."""
         targets = list(others)
         for (hip, thigh, calf), leg in zip(self.leg_indices, angles, strict=True):
             targets[hip], targets[thigh], targets[calf] = leg
         return tuple(targets)
 
     def clamp(self, positions: Sequence[float]) -> Targets:
-        """Return the nearest positions within the limits."""
+        """Clamp positions to the joint limits."""
         return tuple(
             limits.clamp(position) for limits, position in zip(self.limits, positions, strict=True)
         )
 
     def footprint(self, height: float, positions: Sequence[float]) -> Feet:
-        """Return where the feet stand with the centre of mass over their middle.
+        """Return the foot positions that put the centre of mass over their middle.
 
         Args:
-            height: Hip axes above the centres of the feet in [m].
-            positions: Positions of all joints in [rad]; of interest for an arm, whose weight
-                moves the centre of mass.
+            height: Height of the hip axes above the foot centres in [m].
+            positions: Positions of all joints in [rad]; those of an arm shift the centre of mass.
 
         Raises:
-            DescriptionError: The legs do not reach so far.
+            DescriptionError: The feet are out of reach.
         """
         placed: Sequence[float] = positions
         shift = 0.0
@@ -399,10 +398,10 @@ class Quadruped:
 
 
 def quadruped(urdf: str) -> Quadruped:
-    """Make the model of a robot from its URDF.
+    """Build the kinematic model of a robot from its URDF.
 
     Raises:
-        DescriptionError: It is no URDF of a quadruped whose legs turn about x, y and y.
+        DescriptionError: The URDF is not that of a quadruped with roll - pitch - pitch legs.
     """
     tree = read_urdf(urdf)
     joints = movable_joints(tree)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The URDF and the poses of a preset by the numbers of model/robot.yaml; the joints of a URDF.
+"""URDF and poses of the presets in model/robot.yaml; the joints of a URDF.
 
 ``ros2 run quad_description urdf`` prints the URDF for other tools.
 """
@@ -29,9 +29,9 @@ LEGS: Final = ('fl', 'fr', 'bl', 'br')
 
 
 class PresetError(DescriptionError):
-    """There is no such preset.
+    """The preset is unknown.
 
-    Scenarios: a name misspelt, a preset of another robot.
+    Scenarios: a misspelt name, a preset of another robot.
     """
 
 
@@ -41,7 +41,7 @@ MODEL = Path(__file__).parent / 'model'
 
 @lru_cache(maxsize=1)
 def robot_numbers() -> dict[str, Any]:
-    """Return the numbers of robot.yaml; one copy, which must not be changed."""
+    """Return the data of robot.yaml; one shared copy, do not modify it."""
     with (MODEL / 'robot.yaml').open(encoding='utf-8') as file:
         numbers: dict[str, Any] = yaml.safe_load(file)
     return numbers
@@ -61,21 +61,20 @@ def robot_urdf(
     *,
     base_footprint: bool = True,
 ) -> str:
-    """Make the URDF of a robot.
+    """Generate the URDF of a robot.
 
     Args:
         preset: One of :data:`PRESETS`.
-        arm: With the arm and gripper on its back.
-        trunk_mass: Mass of the trunk in [kg] when the robot carries more than the bare one, whose
-            figure is the preset's.
-        base_footprint: With that frame on a floating joint, for robot_state_publisher.
+        arm: Add the arm and gripper on its back.
+        trunk_mass: Mass of the trunk in [kg], for a robot with a payload; by default the preset's.
+        base_footprint: Add that frame on a floating joint, for robot_state_publisher.
 
     Returns:
         The URDF as XML text.
 
     Raises:
-        PresetError: There is no such preset.
-        DescriptionError: The mass of the trunk is none.
+        PresetError: The preset is unknown.
+        DescriptionError: The mass of the trunk is invalid.
     """
     if preset not in PRESETS:
         raise PresetError(f'unknown preset {preset!r}; choose one of {", ".join(PRESETS)}')
@@ -98,7 +97,7 @@ def robot_urdf(
 
 
 def preset_of(urdf: str) -> str:
-    """Return the preset that a URDF was made of, by the name of its robot; empty for none."""
+    """Return the preset that a URDF was generated from, by its robot name; empty if none."""
     found = re.search(r'<robot [^>]*name="xgo_(\w+)"', urdf)
     return found[1] if found and found[1] in PRESETS else ''
 
@@ -123,7 +122,7 @@ _GRIPPER = 'hand_right_joint'
 
 
 class Pose(Enum):
-    """A pose that robot.yaml has the numbers of."""
+    """Poses defined in robot.yaml."""
 
     STAND = 'stand'
     LIE = 'lie'
@@ -146,7 +145,7 @@ def pose_positions(pose: Pose, arm: bool = False) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Range of a joint."""
+    """Position, velocity and effort limits of a joint."""
 
     lower: float = -math.inf  # smallest position in [rad] or [m]
     upper: float = math.inf  # largest position in [rad] or [m]
@@ -160,27 +159,27 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint that takes commands of its own."""
+    """A joint with its own motor."""
 
     name: str  # name in the URDF
     limits: JointLimits  # its range
 
 
 def movable_joints(urdf: str | KinematicTree) -> tuple[Joint, ...]:
-    """Return the joints that have a motor, in the order of the URDF; those that mimic do not.
+    """Return the joints with a motor, in the order of the URDF; excludes mimic joints.
 
     Raises:
-        DescriptionError: It is no URDF, or a joint has no usable limits.
+        DescriptionError: The URDF is invalid, or a joint has no usable limits.
     """
     tree = read_urdf(urdf) if isinstance(urdf, str) else urdf
     return tuple(Joint(joint.name, limits_of(joint)) for joint in tree.joints if joint.independent)
 
 
 def limits_of(joint: UrdfJoint) -> JointLimits:
-    """Return the range of a movable joint.
+    """Return the limits of a movable joint.
 
     Raises:
-        DescriptionError: It has no limits, or these have no finite numbers.
+        DescriptionError: The limits are missing or not finite.
     """
     given = joint.limit or {}
     if missing := [key for key in ('velocity', 'effort') if key not in given]:
@@ -203,7 +202,7 @@ INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 
 def run_command(run: Callable[[Sequence[str]], int]) -> NoReturn:
-    """Run a program with the arguments of its command line, and end with its exit code."""
+    """Run a program with the process's arguments, and exit with its exit code."""
     interrupted = False
 
     def interrupt(_number: int, _frame: object) -> None:

@@ -3,7 +3,7 @@
 """Rotations as unit quaternions (x, y, z, w), from the body to the world.
 
 Roll, pitch and yaw turn about fixed axes x, y, z, in this order (REP 103). Angles are in [rad].
-What arms need as well is of urdf_reader.
+Rotations that arms need as well are in urdf_reader.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = [
 
 
 def normalized(rotation: Quaternion) -> Quaternion:
-    """Return the unit quaternion of the same direction.
+    """Normalize a quaternion.
 
     Raises:
         ZeroDivisionError: All four numbers are zero.
@@ -46,7 +46,7 @@ def normalized(rotation: Quaternion) -> Quaternion:
 
 
 def axes_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector, ...]:
-    """Return the body's axes in the world; quicker than :func:`rotate` for several vectors."""
+    """Return the body's axes in the world; faster than :func:`rotate` for several vectors."""
     sr, cr = math.sin(roll), math.cos(roll)
     sp, cp = math.sin(pitch), math.cos(pitch)
     sy, cy = math.sin(yaw), math.cos(yaw)
@@ -58,7 +58,7 @@ def axes_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector, ...]:
 
 
 def roll_pitch_yaw(rotation: Quaternion) -> Vector:
-    """Return the angles of a rotation; the pitch is within a quarter turn."""
+    """Return roll, pitch and yaw of a rotation; the pitch is within -pi/2 to pi/2."""
     x, y, z, w = rotation
     # rounding may lead just beyond the range of asin
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
@@ -72,19 +72,19 @@ def yaw_of(rotation: Quaternion) -> float:
 
 
 def tilt_of(rotation: Quaternion) -> float:
-    """Return the angle between the body's z axis and up."""
+    """Return the angle between the body's z axis and the vertical."""
     x, y, _, _ = rotation
     return math.acos(min(max(1 - 2 * (x * x + y * y), -1.0), 1.0))
 
 
 def down_in_body(rotation: Quaternion) -> Vector:
-    """Return the unit vector of gravity in the body; (0, 0, -1) upright."""
+    """Return the unit vector of gravity in the body; (0, 0, -1) when upright."""
     x, y, z, w = rotation
     return 2 * (w * y - x * z), -2 * (y * z + w * x), 2 * (x * x + y * y) - 1.0
 
 
 def about_z(angle: float) -> Quaternion:
-    """Return the rotation by an angle about the vertical."""
+    """Return the rotation by an angle about the z axis."""
     return 0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)
 
 
@@ -95,7 +95,7 @@ def conjugate(rotation: Quaternion) -> Quaternion:
 
 
 def rotation_vector(rotation: Quaternion) -> Vector:
-    """Return axis times angle, the shorter way round."""
+    """Return the rotation vector (axis times angle) of the shorter rotation."""
     x, y, z, w = rotation
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
@@ -106,6 +106,6 @@ def rotation_vector(rotation: Quaternion) -> Vector:
 
 
 def angle_between(one: Vector, other: Vector) -> float:
-    """Return the angle between two vectors that are not zero."""
+    """Return the angle between two non-zero vectors."""
     cosine = sum(a * b for a, b in zip(one, other, strict=True))
     return math.acos(min(max(cosine / (math.hypot(*one) * math.hypot(*other)), -1.0), 1.0))

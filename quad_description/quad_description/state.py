@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""State of a quadruped as its sensors measure it, and the back end that it comes from.
+"""Measured state of a quadruped, and the back end that provides it.
 
 SI units, frames of REP 103 and 145.
 """
@@ -38,7 +38,7 @@ MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """Joints as they were measured, in the order of :attr:`.Quadruped.names`."""
+    """Measured joints, in the order of :attr:`.Quadruped.names`."""
 
     positions: tuple[float, ...]  # in [rad] or [m]
     velocities: tuple[float, ...] | None  # in [rad/s] or [m/s]; None when they are not measured
@@ -50,12 +50,12 @@ class JointSample:
     velocity_error: float = 0.0
 
     def measured(self, names: Sequence[str]) -> dict[str, float]:
-        """Return the positions that are measured, by joint."""
+        """Return the measured positions by joint."""
         positions = zip(names, self.positions, strict=True)
         return {name: p for i, (name, p) in enumerate(positions) if i not in self.unmeasured}
 
     def problem(self, count: int) -> str:
-        """Return what is wrong with it, nothing when it can be used."""
+        """Return why the sample is unusable; empty if it is usable."""
         for what, values in (('positions', self.positions), ('velocities', self.velocities)):
             if values is None:
                 continue
@@ -68,7 +68,7 @@ class JointSample:
 
 @dataclass(frozen=True, slots=True)
 class ImuSample:
-    """The body's attitude and motion, in the body's frame."""
+    """Attitude and motion of the body, in the body's frame."""
 
     orientation: Quaternion  # unit quaternion of the body in the world, x, y, z, w
     angular_velocity: Vector | None  # in [rad/s]; None when it is not measured
@@ -82,11 +82,11 @@ class ImuSample:
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether not even the signs of the orientation are sure; a wrong one is fed back."""
+        """Whether even the signs of the orientation are unsure; a wrong sign destabilizes."""
         return self.deviation > MAX_DEVIATION
 
     def problem(self) -> str:
-        """Return what is wrong with it, nothing when it can be used."""
+        """Return why the sample is unusable; empty if it is usable."""
         parts = (*self.orientation, *(self.angular_velocity or ()), *(self.acceleration or ()))
         if not all(map(math.isfinite, parts)):
             return 'imu values that are not finite'
@@ -96,7 +96,7 @@ class ImuSample:
 
     @property
     def down(self) -> Vector:
-        """Direction of gravity in the body's frame; (0, 0, -1) upright."""
+        """Unit vector of gravity in the body's frame; (0, 0, -1) when upright."""
         return down_in_body(normalized(self.orientation))
 
     @property
@@ -106,13 +106,13 @@ class ImuSample:
 
     @property
     def tilt(self) -> float:
-        """Angle between the body's z axis and up in [rad]."""
+        """Angle between the body's z axis and the vertical in [rad]."""
         return tilt_of(normalized(self.orientation))
 
 
 @dataclass(frozen=True, slots=True)
 class OdometryState:
-    """Where the body is, in the frame in which it began."""
+    """Pose and velocity of the body relative to its start."""
 
     x: float  # position of base_link [m]
     y: float  # position of base_link [m]
@@ -135,7 +135,7 @@ class OdometryState:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """State of a robot, as far as it is new; what every back end observes."""
+    """State of a robot, as observed by any back end; unknown or outdated parts are None."""
 
     joints: JointSample | None = None  # the newest joint states, None when there were none
     # the newest attitude, None when there was none or the IMU is of no use
@@ -164,31 +164,31 @@ class RobotState:
 
 
 class Backend(ABC):
-    """What gets joint targets and gives states, one period after the other."""
+    """Interface of a robot: takes joint targets, returns states, period by period."""
 
     names: tuple[str, ...]  # joints in the order of states and targets
     period: float  # time that a step takes in [s]
 
     @abstractmethod
     def reset(self) -> RobotState:
-        """Begin anew and return the first state."""
+        """Restart and return the first state."""
 
     @abstractmethod
     def step(self, targets: Sequence[float] | None) -> RobotState:
-        """Send targets in [rad], or nothing; return the state a period later."""
+        """Send targets in [rad], or None; return the state one period later."""
 
     @abstractmethod
     def observe(self) -> RobotState:
-        """Return the state of now; no time passes."""
+        """Return the present state without advancing time."""
 
     @abstractmethod
     def close(self) -> None:
-        """Release what the back end holds; nothing else may be called afterwards."""
+        """Release all resources; call nothing else afterwards."""
 
     def __enter__(self) -> Self:
-        """Use it in a with statement."""
+        """Return the back end."""
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Close it."""
+        """Close the back end."""
         self.close()

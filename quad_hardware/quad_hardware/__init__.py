@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Serial bridge of the XGO quadruped: both protocols, driver, node and tools.
+"""Serial bridge of the XGO quadruped: protocols, driver, node and tools.
 
-Conventions: ``now`` and all times are on the steady clock in [s], unless they are named otherwise;
-servo angles are in [deg] by motor id on the side of the board, joints in [rad] elsewhere.
+Conventions: ``now`` and all times are on the steady clock in [s], unless stated
+otherwise; servo angles are in [deg] by motor id, as on the board, joint positions in [rad].
 """
 
 from .exceptions import (

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot on its serial port, or in a log of it, as a back end without ROS."""
+"""Back ends for the robot on its serial port, or in a serial log; no ROS."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from .serial_robot import ObservedRobot, RobotSettings, SerialRobot
 
 
 class ReplayedRobot(ObservedRobot):
-    """Takes what a serial log has; nothing is written to a port, for there is none.
+    """Processes a serial log; has no port, so nothing is sent.
 
-    What a :class:`.SerialRobot` decides by looking at bytes is decided anew, by the same parser,
-    dialect and estimation; states of the link are those of the log, which has no commands that
-    were not sent. Times are those of the log [s].
+    It evaluates the bytes anew with the parser, dialect and estimation of :class:`.SerialRobot`;
+    link states come from the log, which lacks commands that were not sent. Times are those of the
+    log [s].
     """
 
     def __init__(self, settings: RobotSettings) -> None:
@@ -50,14 +50,14 @@ class ReplayedRobot(ObservedRobot):
         self._reported_at = -math.inf
 
     def status(self) -> LinkStatus:
-        """Return how the link was."""
+        """Return the link status at this time of the log."""
         return self._status.at(self._now - self._reported_at)
 
     def take(self, entry: Entry, now: float) -> None:
         """Process the next entry of the log.
 
         Raises:
-            RecordingError: These bytes cannot be read.
+            RecordingError: The bytes cannot be decoded.
         """
         self.advance(now)
         if isinstance(entry, Opened):
@@ -68,7 +68,7 @@ class ReplayedRobot(ObservedRobot):
             self._transfer(entry)
 
     def advance(self, now: float) -> None:
-        """Advance the time: the rest of a frame may not come any more."""
+        """Advance the time; discard an incomplete frame after a time-out."""
         self._now = now
         if self._dialect is None or not self._received.pending:
             return
@@ -76,7 +76,7 @@ class ReplayedRobot(ObservedRobot):
             self._handle(self._received.expire(), self._dialect)
 
     def restart(self) -> None:
-        """Forget the robot, as the log begins again; time goes on."""
+        """Reset the robot, because the log restarts; time continues."""
         self._begin()
         self._dialect = None
         self._enter(LinkState.CONNECTING, 'the log begins again')
@@ -121,7 +121,7 @@ class ReplayedRobot(ObservedRobot):
         self._handle(self._received.feed(transfer.data), self._dialect)
 
     def _command(self, dialect: Dialect, frame: Frame) -> None:
-        """Count a frame that sends all legs somewhere."""
+        """Count a frame that moves all legs."""
         self._status.commands += dialect.handle_sent(frame, self._now).keys() >= set(LEG_MOTORS)
 
     def _handle(self, frames: list[Frame], dialect: Dialect) -> None:
@@ -144,12 +144,11 @@ _log = logging.getLogger(__name__)
 def robot_at(
     port: str, urdf: str, protocols: Sequence[Protocol] = PROTOCOLS, *, imu_checked: bool = False
 ) -> SerialBackend:
-    """Return the back end of a robot that is as its URDF says.
+    """Return the back end of a robot described by its URDF.
 
     Args:
-        protocols: What to try, in this order.
-        imu_checked: Its IMU is mounted as in the URDF, which was checked; a
-            simulated one is.
+        protocols: Protocols to try, in this order.
+        imu_checked: The IMU mounting was checked against the URDF; true in simulation.
 
     Raises:
         CommandError: The legs of the URDF cannot be read.
@@ -159,16 +158,16 @@ def robot_at(
 
 
 def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> list[RobotState]:
-    """Return the states of a serial log, in their order and without ROS.
+    """Return the states in a serial log, in order.
 
     Args:
-        log: Of a black box, or of the parameter ``serial_log`` of hardware_node.
-        imu_checked: As of :func:`robot_at`.
+        log: Log of a black box, or of the parameter ``serial_log`` of hardware_node.
+        imu_checked: See :func:`robot_at`.
 
     Raises:
         CommandError: The legs of the URDF cannot be read.
-        RecordingError: The log is damaged, or has no report.
-        OSError: It cannot be read.
+        RecordingError: The log is damaged, or contains no report.
+        OSError: The log cannot be read.
     """
     states: list[RobotState] = []
     robot = ReplayedRobot(_settings_of(LinkOptions(str(log)), urdf, imu_checked=imu_checked))
@@ -181,14 +180,14 @@ def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> list[Robo
 
 
 class SerialBackend(Backend):
-    """Has a robot commanded and observed by its serial port.
+    """Commands and observes a robot on its serial port.
 
-    A step ends with the next report of the robot. When no step comes for 0.5 s while a leg is in
-    the air, and at the end, the robot is laid down (see :class:`.LossReaction`).
+    A step ends with the next report of the robot. Without a step for 0.5 s while a leg is in the
+    air, and at the end, the robot lies down (see :class:`.LossReaction`).
     """
 
     def __init__(self, settings: RobotSettings) -> None:
-        """Prepare; :meth:`reset` opens the port.
+        """Set up the back end; :meth:`reset` opens the port.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
@@ -206,7 +205,7 @@ class SerialBackend(Backend):
         self._started = False
 
     def reset(self) -> RobotState:
-        """Wait for a report; the robot stays where it is.
+        """Wait for a report; do not move the robot.
 
         Raises:
             NoAnswerError: No robot reports within 10 s.
@@ -217,7 +216,7 @@ class SerialBackend(Backend):
         return self._next_state(CONNECT_TIME)
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
-        """Send targets, and wait for the next report.
+        """Send targets and wait for the next report.
 
         Raises:
             CommandError: The targets were not sent; the message has the reason.
@@ -231,10 +230,10 @@ class SerialBackend(Backend):
         return self._next_state(STALE_TIME)
 
     def observe(self) -> RobotState:
-        """Return what the newest report says.
+        """Return the state of the newest report.
 
         Raises:
-            NoAnswerError: There is none.
+            NoAnswerError: There is no report.
         """
         with self._arrived:
             if self._state is None:
@@ -242,7 +241,7 @@ class SerialBackend(Backend):
             return self._state
 
     def close(self) -> None:
-        """Lay the robot down where it may not be left as it is, and close the port."""
+        """Lay the robot down if a leg is in the air, and close the port."""
         with self._commanding:
             self._commanded_at = None
             self._robot.end(_log.error)
@@ -268,7 +267,7 @@ class SerialBackend(Backend):
                 self._commanding.release()
 
     def _watch_commands(self) -> None:
-        """Lay the robot down when its commands ended with a leg in the air."""
+        """Lay the robot down if its commands ended with a leg in the air."""
         if self._robot.goes_down:
             self._robot.go_down()
         elif self._commanded_at and time.monotonic() - self._commanded_at > self._robot.timeout:
@@ -296,7 +295,7 @@ def _log_link(state: LinkState, detail: str) -> None:
 
 
 class JointBytes:
-    """Joints of an XGO as protocol v1 carries them: positions in bytes, velocities estimated.
+    """Joint positions rounded as in protocol v1, with estimated velocities.
 
     For simulations without a serial line.
     """
@@ -311,11 +310,11 @@ class JointBytes:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the positions so far."""
+        """Clear the past positions."""
         self._rate = JointRate(EstimatorSettings().joint_velocity_cutoff)
 
     def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
-        """Return positions in the order of the URDF [rad] after a byte each."""
+        """Round positions in the order of the URDF [rad] to one byte each."""
         return tuple(
             positions_of[span.encode(servo.angle(position))]
             for servo, span, positions_of, position in zip(
@@ -324,7 +323,7 @@ class JointBytes:
         )
 
     def read(self, positions: Sequence[float], time: float) -> JointSample:
-        """Return what the bridge estimates of positions [rad] at a time [s]."""
+        """Return the bridge's estimate for positions [rad] at a time [s]."""
         seen = self.rounded(positions)
         named = {servo.joint: each for servo, each in zip(self._servos, seen, strict=True)}
         rates = tuple(self._rate.update(time, named).values())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From joint commands to servo angles: checked, limited, counted, and watched for their end."""
+"""Converts joint commands to servo angles: checks, limits and counts them, detects their end."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REPORT_TIMEOUT = 0.4  # [s] for a report after commands broke off; a stall delay
 
 @dataclass(slots=True)
 class CommandCounters:
-    """What became of joint commands."""
+    """Counters of joint commands by outcome."""
 
     received: int = 0  # all of them
     refused: int = 0  # of wrong length, not finite, or far from legs that something else has moved
@@ -42,11 +42,11 @@ class CommandCounters:
 
 
 class JointCommander:
-    """Lets joint commands through to the servos, and brings the robot down when they break off.
+    """Passes joint commands to the servos, and lays the robot down if they break off.
 
     Times are on the monotonic clock [s]. A controller that dies in the middle of a trot leaves two
-    legs in the air, and the servos hold them there; so does one that held there for a fault, and
-    then ended. A robot on all its feet stays as it is, whether it moved or was put into a posture.
+    legs in the air, held by the servos; so does one that held there because of a fault and then
+    exited. A robot on all its feet stays as it is, whatever its posture.
     """
 
     def __init__(
@@ -60,14 +60,14 @@ class JointCommander:
         obstacle: Callable[[], str],
         warn: Callable[[str], None],
     ) -> None:
-        """Begin without a stream.
+        """Start without a stream.
 
         Args:
-            raised: Names the feet that are in the air at targets of the legs [rad].
-            send: Has servo angles sent, by motor id [deg]; returns whether they are.
-            waits: Says whether the last angles have not left yet; newer ones replace them.
-            obstacle: Says why nothing is sent.
-            warn: Takes what is the matter with a command.
+            raised: Returns the feet that are in the air at targets of the legs [rad].
+            send: Sends servo angles, by motor id [deg]; returns whether it does.
+            waits: Returns whether the last angles are still unsent; newer ones replace them.
+            obstacle: Returns why nothing can be sent; empty if it can.
+            warn: Receives warnings about commands.
         """
         self.timeout = limiter.stream_timeout  # a pause after which a stream has ended [s]
         self.counters = CommandCounters()  # what became of them
@@ -90,23 +90,23 @@ class JointCommander:
 
     @property
     def goes_down(self) -> bool:
-        """Whether the robot is on its way down."""
+        """Whether the robot is lying down."""
         return self._place is not None
 
     def is_commanded(self, now: float) -> bool:
-        """Whether the last command is no longer ago than a pause."""
+        """Whether the last command is recent."""
         return now - self._last_at < self.timeout
 
     @property
     def _hazard(self) -> str:
-        """How the last stream ended, if that is nothing to be left so; else nothing."""
+        """Why the end of the last stream is a hazard; empty if it is not."""
         if not self._last or self._last_at - self._began_at < MIN_STREAM:
             return ''
         raised = self._raised(self._last)
         return f'with {" or ".join(raised)} in the air' if raised else ''
 
     def _forget(self) -> None:
-        """Forget the stream: the robot was lost or let go, and is not moved unasked."""
+        """Discard the stream after a loss or release, so that the robot does not move unasked."""
         self._place, self._unseen_at = None, math.inf
         self._began_at = self._last_at = -math.inf
         self._last = ()
@@ -123,37 +123,37 @@ class JointCommander:
         return ''
 
     def limit_to(self, joints: JointMap) -> None:
-        """Limit targets to the limits of these joints from now on; any thread may call it."""
+        """Use the limits of these joints from now on; thread-safe."""
         self._limiter.joints = joints
 
     def lose(self) -> None:
-        """Begin anew with the next command, for the robot was lost; any thread may call it."""
+        """Start a new stream with the next command, after loss of the robot; thread-safe."""
         self._limiter.reset()
         self._last_targets = ()
 
     def let_go(self) -> None:
-        """Send nothing more until a command begins where the legs are.
+        """Send nothing until a command begins at the present leg positions.
 
-        What a controller streams is where they were: the robot would rise unasked. A pause of
-        the stream is no new request; a stalled process makes one, too.
+        A controller still streams the old positions: the robot would rise unasked. A pause in the
+        stream is not a new request, because a stalled process causes one, too.
         """
         self.lose()
         self._forget()
         self._moved_by, self.counters.loss = 'the servos were let go', ''
 
     def refuse(self, error: CommandError) -> None:
-        """Count a command that is none."""
+        """Count an invalid command."""
         self.counters.refused += 1
         self._trouble(f'joint command refused: {error}')
 
     def take(
         self, positions: Sequence[float], place: Mapping[str, float], now: float
     ) -> Command | None:
-        """Send a command; return what was sent for it, None for nothing.
+        """Send a command; return what was sent; None if nothing was.
 
         Args:
             positions: Targets of the first joints, in the order of the URDF [rad], [m].
-            place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
+            place: Joint positions [rad], [m]; empty without a recent report.
         """
         command = self._send(positions, place, now, descent=False)
         if command is not None:
@@ -165,14 +165,14 @@ class JointCommander:
         return command
 
     def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str | None:
-        """Bring the robot down, if the end of its commands is a hazard; return what it does.
+        """Lay the robot down if missing commands are a hazard; return what it does.
 
         Args:
-            place: As in :meth:`take`.
-            tilt: Of the body [rad]; None when it is unknown.
+            place: See :meth:`take`.
+            tilt: Tilt of the body [rad]; None if unknown.
 
         Returns:
-            What the robot does; empty without a hazard; None while a report is awaited.
+            What the robot does; empty without a hazard; None while a report is pending.
         """
         hazard = self._hazard
         if not hazard:
@@ -198,10 +198,10 @@ class JointCommander:
         return self.counters.loss
 
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
-        """Send the next targets on the way down; None for nothing, while it waits too.
+        """Send the next targets on the way down; None if nothing is sent, as in a wait.
 
-        They are on a path with a soft start and end, which waits while it is not stepped: what is
-        sent keeps up with it, to its end.
+        They follow a path with a soft start and end, whose time stands still between calls, so the
+        sent targets keep up with it to its end.
         """
         start = self._place
         if start is None or self._awaits_report(place, now):
@@ -220,7 +220,7 @@ class JointCommander:
         return command
 
     def _awaits_report(self, place: Mapping[str, float], now: float) -> bool:
-        """Return whether a report of the legs is missing, and not for long yet."""
+        """Return whether a leg report is missing, but not for long yet."""
         self._unseen_at = math.inf if place else min(self._unseen_at, now)
         return not place and now < self._unseen_at + REPORT_TIMEOUT
 
@@ -258,7 +258,7 @@ class JointCommander:
         return command
 
     def _check_start(self, positions: Sequence[float], place: Mapping[str, float]) -> None:
-        """Refuse targets that do not begin where the legs are, and where one is not measured."""
+        """Reject targets that do not start at the legs' positions, or if one is unmeasured."""
         pairs = zip(self._legs, positions, strict=False)
         far = {name: abs(target - place.get(name, math.inf)) for name, target in pairs}
         joint = max(far, key=far.__getitem__)

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a report of the robot, in the units of the wire, to its state in SI units.
+"""Converts a robot's reports in wire units to its state in SI units.
 
-How the IMU sits on the body turns what it reports into base_link. What the robot does not report
-is derived: rates, the way, which feet stand, the height.
+The IMU mounting maps IMU values to base_link. Quantities that the robot does not report are
+estimated: rates, odometry, foot contacts, height.
 
-Heading is from the attitude; where the body has walked to, from the legs that stand. There are no
-contact switches. A foot is taken to stand, more or less surely, the nearer it is to the ground and
-the more the body goes over it as it goes on the whole: a foot that swings goes the other way. The
-ground is the plane of the places where the feet were lowest lately, which may slope. The feet are
-balls that roll on the ground while the leg swings over them: their centres go a little way along,
-which is more than a tenth of the way (radius over height of the hip).
+The heading comes from the attitude, the position from the stance legs. There are no contact
+switches. A foot's stance weight grows as it nears the ground and as the body's motion over it
+agrees with the overall motion: a swing foot moves the other way. The ground is the plane through
+the lowest recent foot positions, and may slope. The feet are balls that roll on the ground while
+the leg turns over them, so their centres advance by more than a tenth of the distance (radius over
+height of the hip).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ POSITIVE: Vector = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class ImuMounting:
-    """From what the IMU reports to base_link: how it sits on the body, and with which signs.
+    """Mounting of the IMU on the body: maps IMU values to base_link, signs included.
 
     With a wrong sign, a controller that levels the body tilts it further and further. In the
     vendor's own simulation the IMU is turned by 180 degrees about the vertical.
@@ -82,11 +82,11 @@ class ImuMounting:
         return multiply(from_rpy(roll, pitch, yaw), conjugate(self.rotation))
 
     def acceleration(self, reported: Vector) -> Vector:
-        """Return a specific force in base_link [m/s²]."""
+        """Rotate a specific force into base_link [m/s²]."""
         return rotate(self.rotation, _signed(self.acceleration_signs, reported))
 
     def rate(self, reported: Vector) -> Vector:
-        """Return an angular velocity in base_link [rad/s] for a reported one [deg/s]."""
+        """Convert a reported angular velocity [deg/s] to base_link [rad/s]."""
         x, y, z = map(math.radians, _signed(self.rate_signs, reported))
         return rotate(self.rotation, (x, y, z))
 
@@ -115,7 +115,7 @@ SCALES = (0.1, 10.0)
 
 @dataclass(frozen=True, slots=True)
 class OdometrySettings:
-    """How the legs are read."""
+    """Parameters of the leg odometry."""
 
     tolerance: float = setting(0.002, 0.0005, 0.05, 'height of a foot down [m]')
     cutoff: float = 5.0  # of the low-pass of the velocity that is published [Hz]
@@ -124,15 +124,15 @@ class OdometrySettings:
 
 
 class LegOdometry:
-    """Adds up what the standing legs say."""
+    """Integrates the motion of the body over its stance legs."""
 
     def __init__(
         self, settings: OdometrySettings, foot_radius: float, lying_height: float = 0.0
     ) -> None:
-        """Begin at the origin.
+        """Start at the origin.
 
         Args:
-            lying_height: Of base_link above the feet [m], up to which the belly carries it.
+            lying_height: Height of base_link above the feet [m] up to which the belly carries it.
         """
         self._settings, self._lying_height = settings, lying_height
         self._radius = foot_radius
@@ -150,14 +150,14 @@ class LegOdometry:
         self._stepped_at = -math.inf  # when a foot was last in the air [s]
 
     def keep_heading(self) -> None:
-        """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
+        """Keep the present heading across the next attitude, whose yaw has a new zero."""
         self._keeps_heading = True
 
     def update(self, time: float, feet: Sequence[FootPose], attitude: Quaternion) -> OdometryState:
-        """Add a measurement.
+        """Add a measurement and update the pose.
 
         Args:
-            time: When [s].
+            time: Time of the measurement [s].
         """
         yaw = yaw_of(attitude)
         if self._yaw0 is None or self._keeps_heading:
@@ -202,7 +202,7 @@ class LegOdometry:
         )
 
     def _above_ground(self, time: float, places: list[Vector]) -> list[float]:
-        """Return how high the feet are above the lowest of them, on ground that may slope [m]."""
+        """Return the heights of the feet above the lowest one, on ground that may slope [m]."""
         lately = self._lately
         lately.append((time, places))
         while time - lately[0][0] > GROUND_TIME:
@@ -248,7 +248,7 @@ class LegOdometry:
             self._distance += math.hypot(ahead, left)
 
     def _way(self, before: FootPose, after: FootPose) -> tuple[float, float]:
-        """Return how far the body has gone over a foot that stands [m]."""
+        """Return the displacement of the body over a stance foot [m]."""
         x, y, _, w = multiply(after.rotation, conjugate(before.rotation))
         # the foot has rolled by the angular step times the vector from the ground to its centre
         rolled = 2.0 * w * self._radius
@@ -264,13 +264,13 @@ class LegOdometry:
 
 
 def ground_normal(lately: Sequence[Sequence[Vector]], tolerance: float) -> Vector | None:
-    """Return the unit normal of the ground, from where the feet were lately.
+    """Return the unit normal of the ground, from recent foot positions.
 
-    None when their lowest places are not in a plane: a foot was in the air all the time.
+    None if the lowest positions are not coplanar: a foot was always in the air.
 
     Args:
-        lately: Feet, in the order of the legs [m]; once at least.
-        tolerance: How far from a plane they may be [m].
+        lately: Recent foot positions, in the order of the legs [m]; at least one set.
+        tolerance: Largest deviation from a plane [m].
     """
     fl, fr, bl, br = (min(places, key=_Z) for places in zip(*lately, strict=True))
     # across both diagonals
@@ -289,7 +289,7 @@ LYING_MARGIN = 0.002  # [m] above the height of a robot that lies
 
 
 class RateSource(Enum):
-    """Where the angular velocity is from."""
+    """Source of the angular velocity."""
 
     AUTO = 'auto'  # the gyro where it is reported
     DIFFERENTIATED = 'differentiated'  # always from the attitude
@@ -298,7 +298,7 @@ class RateSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EstimatorSettings:
-    """How reports are read."""
+    """Parameters of the estimator."""
 
     angular_velocity_source: RateSource = switch(  # noqa: RUF009  # a field
         RateSource.AUTO, 'auto: the gyro where it is reported, else differentiated attitude'
@@ -310,10 +310,10 @@ class EstimatorSettings:
 
 
 class Estimator:
-    """Turns reports into states of the robot."""
+    """Converts reports to robot states."""
 
     def __init__(self, urdf: str, joints: JointMap, settings: EstimatorSettings) -> None:
-        """Begin without a report.
+        """Start without a report.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
@@ -342,15 +342,15 @@ class Estimator:
         self._odometry = LegOdometry(settings.odometry, radius, lying)
 
     def command(self, targets: Sequence[float]) -> None:
-        """Note where the first joints were sent, in their order [rad]; some are not measured."""
+        """Record the last targets of the first joints, in order [rad], for unmeasured joints."""
         self._sent = {**self._sent, **dict(zip(self._joints.names, targets, strict=False))}
 
     def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
-        """Return the feet that are in the air at targets of the first joints [rad]."""
+        """Return the feet that are in the air at given targets of the first joints [rad]."""
         return raised_feet(self._robot.feet(targets))
 
     def step(self, report: Report) -> RobotState | None:
-        """Return the state that a report shows; None when the report cannot be."""
+        """Return the state for a report; None if the report is implausible."""
         if reason := self._plausibility.check(report):
             self.refusal = reason
             return None
@@ -384,7 +384,7 @@ class Estimator:
     def gravity_error(self) -> float | None:
         """Angle between accelerometer and attitude [rad].
 
-        None while the body accelerates or the IMU is of no use, and without an accelerometer.
+        None while the body accelerates, the IMU is unusable, or without an accelerometer.
         """
         return None if self._plausibility.imu_problem else self._gravity.error
 

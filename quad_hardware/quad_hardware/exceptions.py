@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that quad_hardware raises.
+"""Exceptions of quad_hardware.
 
 ::
 
     HardwareError
-    ├── CodecError (ValueError)        a value does not fit its field, or bytes are no payload
+    ├── CodecError (ValueError)        a value does not fit its field, or a payload is invalid
     ├── CommandError (ValueError)      a joint command or a mapping is refused; nothing was sent
     ├── LinkError (OSError)            a serial port cannot be opened, or was lost
     │   └── NoAnswerError (TimeoutError)   no robot answers on a port that is open
@@ -26,7 +26,7 @@ class CodecError(HardwareError, ValueError):
 
 
 class CommandError(HardwareError, ValueError):
-    """A joint command or a joint mapping is refused before a byte was sent.
+    """A joint command or a joint mapping is rejected before anything is sent.
 
     Scenarios: NaN or infinite positions, a wrong number of joints, an unknown joint name.
     """
@@ -40,14 +40,14 @@ class LinkError(HardwareError, OSError):
 
 
 class NoAnswerError(LinkError, TimeoutError):
-    """A port is open and no robot answers on it.
+    """The port is open, but no robot answers.
 
     Scenarios: the robot is off, another program reads the same port, another baud rate.
     """
 
 
 class RecordingError(HardwareError, ValueError):
-    """A serial log cannot be written, is damaged, or has nothing that can be replayed.
+    """A serial log cannot be written, is damaged, or has no content to replay.
 
     Scenarios: the file exists already, a line was edited, the session went through the vendor's
     library.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Filters of the estimator: rates from differences through a low-pass, gravity, battery."""
+"""Filters of the estimator: low-passed rates from differences, gravity, battery."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REPORTS = 50  # that are looked at together: a second, in which the pushes of a 
 
 
 def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
-    """Return the unit vector that points down, in the body; None while it accelerates.
+    """Return the unit vector of gravity in the body; None while it accelerates.
 
     An accelerometer at rest reads the opposite of gravity (REP 145).
     """
@@ -37,22 +37,22 @@ def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
 
 
 class GravityCheck:
-    """Compares both directions over some time: each step of a gait accelerates the body.
+    """Compares mean gravity directions of attitude and accelerometer: gait steps disturb each.
 
-    More than a few degrees: the axes of the IMU are not those of the body.
+    A difference of more than a few degrees means that the IMU axes are not those of the body.
     """
 
     def __init__(self) -> None:
         self._reports: deque[tuple[Quaternion, Vector]] = deque(maxlen=REPORTS)
 
     def take(self, attitude: Quaternion, acceleration: Vector | None) -> None:
-        """Add a report; None without an accelerometer, else specific force in the body [m/s²]."""
+        """Add an attitude and the specific force in the body [m/s²]; None without one."""
         if acceleration is not None:
             self._reports.append((attitude, acceleration))
 
     @property
     def error(self) -> float | None:
-        """Angle between the means [rad]; None in the first second, and while it accelerates."""
+        """Angle between the mean directions [rad]; None in the first second and in motion."""
         reports = list(self._reports)  # another thread may take the next one
         if len(reports) < REPORTS:
             return None
@@ -71,13 +71,13 @@ FULL = 100.0  # [%]
 
 
 class MedianFilter:
-    """Median of the last values of the battery."""
+    """Median of the last battery values."""
 
     def __init__(self) -> None:
         self._values: deque[float] = deque(maxlen=CHARGE_REPORTS)
 
     def take(self, value: float | None, highest: float = math.inf) -> float | None:
-        """Add a value, which does not count when it is missing or beyond 0 to the highest."""
+        """Add a value, unless it is missing or out of range; return the median."""
         if value is not None and 0.0 <= value <= highest:
             self._values.append(value)
         return median(self._values) if self._values else None
@@ -91,26 +91,26 @@ def low_pass_share(cutoff: float, elapsed: float) -> float:
     """Return the weight of the newest value in a first-order low-pass filter.
 
     Args:
-        cutoff: Frequency at which the amplitude is 0.7 [Hz]; an infinite one filters nothing.
+        cutoff: -3 dB frequency [Hz]; infinity disables the filter.
         elapsed: Time since the previous value [s].
     """
     return 1.0 - math.exp(-2.0 * math.pi * cutoff * elapsed)
 
 
 class AttitudeRate:
-    """Angular velocity from the difference of attitudes, in the frame of the body.
+    """Angular velocity in the body frame, from attitude differences.
 
-    By quaternions, so that a yaw that wraps is no jump. There is no raw gyro in protocol v2.
+    It uses quaternions, so a wrapping yaw causes no jump. Protocol v2 has no raw gyro.
     """
 
     def __init__(self, cutoff: float) -> None:
-        """Begin at rest; the low-pass has a cutoff [Hz]."""
+        """Start at rest; the cutoff of the low-pass is in [Hz]."""
         self._cutoff = cutoff
         self._last: tuple[float, Quaternion] | None = None
         self._rate = ZERO
 
     def update(self, time: float, attitude: Quaternion) -> Vector:
-        """Add an attitude; return the rate [rad/s]. After a gap it begins at zero again."""
+        """Add an attitude; return the rate [rad/s]. After a gap it restarts at zero."""
         last, self._last = self._last, (time, attitude)
         if last is None or not 0.0 < time - last[0] <= MAX_GAP:
             self._rate = ZERO
@@ -137,15 +137,15 @@ NOMINAL_PERIOD = 0.02  # [s] from which on it grows with the period, to the powe
 
 
 class JointRate:
-    """Joint velocities from the last three positions, where the robot does not report them.
+    """Joint velocities from the last three positions, for robots that do not report them.
 
-    Its error is judged by the velocities that the report after shows: the slope between its
-    neighbours. That contains the rounding of positions, so it is no smaller than the true one as
-    long as reports are frequent.
+    It estimates its error by comparison with the slope between the neighbouring reports, known one
+    report later. That slope includes the rounding of positions, so the estimate is no smaller than
+    the true error while reports are frequent.
     """
 
     def __init__(self, cutoff: float) -> None:
-        """Begin at rest; the low-pass has a cutoff [Hz]."""
+        """Start at rest; the cutoff of the low-pass is in [Hz]."""
         self._error = 0.0  # as reports show it, rms [rad/s]
         self._period = NOMINAL_PERIOD  # between reports, in the mean [s]
         self._cutoff = cutoff
@@ -157,15 +157,15 @@ class JointRate:
 
     @property
     def error(self) -> float:
-        """Of the velocities [rad/s] rms: what reports show, or what a trot would have.
+        """Error of the velocities [rad/s] rms: as observed, or at least that of a trot.
 
-        A robot that stands shows only rounding, and is about to walk.
+        A standing robot shows only rounding errors, but may walk soon.
         """
         slower = max(self._period / NOMINAL_PERIOD, 1.0)
         return max(self._error, TROT_ERROR * math.pow(slower, 1.5))
 
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
-        """Add positions [rad]; return velocities [rad/s] of the same joints."""
+        """Add positions [rad]; return the velocities [rad/s] of the same joints."""
         elapsed, last = time - self._time, self._last
         if elapsed <= 0.0 and last.keys() == positions.keys():
             return dict(self._rates)  # the same report

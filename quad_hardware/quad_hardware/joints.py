@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joints of the URDF [rad] against servo angles on the wire [deg], and what a command may do.
+"""Maps URDF joints [rad] to servo angles on the wire [deg]; checks and limits commands.
 
-``position = offset + sign * gain * angle``. For a turning joint the gain is pi/180. For the
-gripper, which slides, the travel of the joint is spread over the servo's whole range.
-A command has the right length, finite numbers within limits, and makes no servo jump.
+``position = offset + sign * gain * angle``. For a revolute joint the gain is pi/180. For the
+prismatic gripper, the travel of the joint maps to the servo's whole range. A valid command has the
+right length and finite numbers within limits, and makes no servo jump.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class JointServo:
     gain: float = DEGREE  # position a degree of the servo is worth [rad/deg], [m/deg]
 
     def __post_init__(self) -> None:
-        """Refuse what would move a servo the wrong way or not at all."""
+        """Reject an invalid sign, offset or range."""
         if self.sign not in {1, -1}:
             raise CommandError(f'{self.joint}: sign {self.sign} is neither 1 nor -1')
         if not math.isfinite(self.offset):
@@ -48,15 +48,15 @@ class JointServo:
             raise CommandError(f'{self.joint}: lower {self.lower} is above upper {self.upper}')
 
     def position(self, angle: float) -> float:
-        """Return the position of the joint [rad], [m] for a servo angle [deg]."""
+        """Return the joint position [rad], [m] for a servo angle [deg]."""
         return self.offset + self.sign * self.gain * angle
 
     def velocity(self, speed: float) -> float:
-        """Return the velocity of the joint [rad/s], [m/s] for one of the servo [deg/s]."""
+        """Return the joint velocity [rad/s], [m/s] for a servo velocity [deg/s]."""
         return self.sign * self.gain * speed
 
     def angle(self, position: float) -> float:
-        """Return the servo angle [deg] for a position of the joint [rad], [m]."""
+        """Return the servo angle [deg] for a joint position [rad], [m]."""
         return self.sign * (position - self.offset) / self.gain
 
 
@@ -64,7 +64,7 @@ def servo_of(joint: Joint, motor: int | None = None) -> JointServo:
     """Return the servo of a joint, with sign 1, no offset and the limits of the URDF.
 
     Args:
-        motor: Its id, where it is not the one that the vendor's names imply.
+        motor: Motor id, if it differs from the one that the vendor's names imply.
 
     Raises:
         CommandError: The joint has no known motor.
@@ -103,14 +103,14 @@ def _within_span(servo: JointServo, span: Span) -> JointServo:
 
 
 class JointMap:
-    """All joints of a robot, in the order of the URDF."""
+    """All joints of a robot with their servos, in the order of the URDF."""
 
     def __init__(self, servos: Iterable[JointServo]) -> None:
-        """Keep the servos; a limit beyond the reach of its servo is taken to that.
+        """Store the servos; reduce limits beyond the range of a servo to that range.
 
         Raises:
             CommandError: A leg's motor is missing or unknown, two joints have the same motor, a
-                joint of the arm stands before one of a leg, or no servo reaches the limits.
+                joint of the arm stands before one of a leg, or a servo cannot reach the limits.
         """
         self.servos = tuple(map(_within_reach, servos))
         self.names = tuple(servo.joint for servo in self.servos)
@@ -143,19 +143,19 @@ class JointMap:
 
     @property
     def leg_count(self) -> int:
-        """How many joints the legs have."""
+        """Number of leg joints."""
         return len(LEG_MOTORS)
 
     def within(self, spans: Mapping[int, Span]) -> JointMap:
-        """Return the joints with their limits within what their servos can be sent [deg]."""
+        """Return a copy with joint limits reduced to what the servos accept [deg]."""
         return JointMap(_within_span(s, spans[s.motor]) for s in self.servos)
 
     def positions(self, angles: Mapping[int, float]) -> dict[str, float]:
-        """Return positions [rad], [m] by joint, of those whose servo is reported."""
+        """Return positions [rad], [m] by joint, for the reported servos."""
         return {s.joint: s.position(angles[s.motor]) for s in self.servos if s.motor in angles}
 
     def velocities(self, speeds: Mapping[int, float]) -> dict[str, float]:
-        """Return velocities [rad/s], [m/s] by joint, as :meth:`positions`."""
+        """Return velocities [rad/s], [m/s] by joint, for the reported servos."""
         return {s.joint: s.velocity(speeds[s.motor]) for s in self.servos if s.motor in speeds}
 
     def angles(self, positions: Sequence[float]) -> dict[int, float]:
@@ -164,7 +164,7 @@ class JointMap:
         return {servo.motor: servo.angle(position) for servo, position in pairs}
 
     def angles_at(self, place: Mapping[str, float]) -> dict[int, float]:
-        """Return servo angles [deg] by motor for positions by joint, of those that are there."""
+        """Return servo angles [deg] by motor for positions by joint; skip missing ones."""
         return {s.motor: s.angle(place[s.joint]) for s in self.servos if s.joint in place}
 
 
@@ -173,7 +173,7 @@ MAX_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
 
 
 class LossReaction(Enum):
-    """What the robot does; the value is that of the parameter."""
+    """Reaction of the robot to lost commands; the value is that of the parameter."""
 
     LIE = 'lie'  # folds its legs
     HOLD = 'hold'  # stays as it is
@@ -181,7 +181,7 @@ class LossReaction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LimiterSettings:
-    """How fast targets may move, and what follows when they break off."""
+    """Speed limits of targets, and the reaction when commands break off."""
 
     # of the gripper, times its travel in a radian of servo
     max_joint_speed: float = setting(12.0, 0.1, 100.0, 'of targets [rad/s]')
@@ -196,7 +196,7 @@ class LimiterSettings:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is sent for a joint command."""
+    """Limited servo angles for a joint command."""
 
     targets: tuple[float, ...]  # positions [rad], [m] of the first joints, in their order
     clamped: tuple[str, ...] = ()  # joints that were asked to go beyond their limits
@@ -207,13 +207,13 @@ class Command:
 
 
 class CommandLimiter:
-    """Lets commands through so that no servo target jumps.
+    """Limits commands so that no servo target jumps.
 
-    A stream of commands begins where the joints are measured to be; it ends with a pause, or
-    when :meth:`reset` is called because the robot was lost. A joint that is found beyond its
-    limits may stay there or come back: its range reaches to where it is, and shrinks with it. A
-    joint that is not measured is taken to be where it was sent last; before that its place is
-    unknown, and its servo has to go slowly.
+    A stream of commands begins at the measured joint positions; it ends with a pause, or with
+    :meth:`reset` after the loss of the robot. A joint found beyond its limits may stay or come
+    back: its range extends to its position, and shrinks as it returns. An unmeasured joint is
+    assumed to be at its last target; before the first target its position is unknown, and its
+    servo has to move slowly.
     """
 
     def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
@@ -228,30 +228,29 @@ class CommandLimiter:
         self._end = self._seen_end = object()  # replaced by reset(), whichever thread it is in
 
     def reset(self) -> None:
-        """End the stream: the next command begins anew, and joints may have been moved.
+        """End the stream; joints may move before the next command starts a new one.
 
-        Any thread may call it; it counts from the next :meth:`step` on.
+        Thread-safe; takes effect at the next :meth:`step`.
         """
         self._end = object()
 
     def withdraw(self) -> None:
-        """Go back to before the last :meth:`step`: its targets were replaced before they left."""
+        """Undo the last :meth:`step`, because its targets were replaced before sending."""
         self._targets = list(self._previous)
 
     def step(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
     ) -> Command:
-        """Limit a command.
+        """Limit a command and return what to send.
 
         Args:
             positions: Targets of all joints, or of the legs only, in the order of the URDF [rad],
                 [m].
-            measured: Where the joints are; None where that is not known, which only joints behind
-                the legs may be: what the protocol does not report.
+            measured: Measured positions; None if not reported, which only non-leg joints may be.
 
         Raises:
-            CommandError: A wrong length, a number that is not finite, or a leg of which nobody
-                knows where it is; nothing is to be sent.
+            CommandError: The length is wrong, a number is not finite, or the position of a leg
+                is unknown; send nothing.
         """
         self.check(positions)
         if (end := self._end) is not self._seen_end:
@@ -264,13 +263,13 @@ class CommandLimiter:
         return self._approach(positions, self._speed(now) * elapsed)
 
     def check(self, positions: Sequence[float]) -> None:
-        """Refuse what is no command, wherever the joints are.
+        """Reject an invalid command, regardless of the joint positions.
 
         Args:
-            positions: As in :meth:`step`.
+            positions: See :meth:`step`.
 
         Raises:
-            CommandError: A wrong length, or a number that is not finite.
+            CommandError: The length is wrong, or a number is not finite.
         """
         names = self.joints.names
         if len(positions) not in {len(names), self.joints.leg_count}:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What went over a serial line: kept in memory, written as a log, read again; for which faults.
+"""Serial logs: in-memory recording, log files, their reader, and the faults that trigger them.
 
-A log is written at once, or from memory after a fault. It has lines of text, each with its time on
-the wall clock in [s]::
+A log is written continuously, or from memory after a fault. It has lines of text, each with a
+wall-clock time in [s]::
 
     # serial log of quad_hardware, version 1: < is from the robot, > to it
     (1764144123.000102) open {"port": "/dev/ttyAMA0", "baud": 2000000, "protocol": "v2", ...}
@@ -11,8 +11,7 @@ the wall clock in [s]::
     (1764144123.000391) > 55 00 0a 01 ...
     (1764144123.021776) < 55 00 ...
 
-A line is what one call has read or written, not a frame. Lines that do not begin with a time are
-comments.
+A line holds the bytes of one read or write call, not a frame. Lines without a time are comments.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ _LINE = re.compile(r'\((\d+\.\d+)\) (<|>|open|state) (.*)')
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """Bytes that were read or written at once."""
+    """Bytes of one read or write call."""
 
     time: float  # when [s]
     data: bytes  # the bytes
@@ -64,7 +63,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A robot that was found; what follows is the conversation with it."""
+    """A robot was found; its session follows."""
 
     time: float  # when [s]
     port: str  # device file
@@ -76,7 +75,7 @@ class Opened:
 
 @dataclass(frozen=True, slots=True)
 class StateEntered:
-    """The state of the link has changed."""
+    """The link entered a state."""
 
     time: float  # when [s]
     state: LinkState  # what the driver does from then on
@@ -88,12 +87,12 @@ Entry: TypeAlias = Transfer | Opened | StateEntered
 
 
 def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
-    """Return the line of bytes, with its end."""
+    """Format a transfer as a line with its newline."""
     return f'({time:.6f}) {SENT if sent else RECEIVED} {data.hex(" ")}\n'
 
 
 def format_event(event: Event, time: float) -> str:
-    """Return the line of what is no transfer, with its end; the time is of the wall clock [s]."""
+    """Format an event as a line with its newline; the time is wall-clock [s]."""
     kind = 'state' if isinstance(event, StateEntered) else 'open'
     content = asdict(event)
     del content['time']
@@ -102,11 +101,11 @@ def format_event(event: Event, time: float) -> str:
 
 
 def read_serial_log(path: Path) -> Iterator[Entry]:
-    """Yield what a log has; times are on the wall clock.
+    """Yield the entries of a log, with wall-clock times.
 
     Raises:
         RecordingError: A line is damaged; the message has its number.
-        OSError: It cannot be read.
+        OSError: The log cannot be read.
     """
     with path.open(encoding='utf-8', errors='replace') as file:
         for number, line in enumerate(file, start=1):
@@ -140,13 +139,13 @@ def _parse(line: str) -> Entry:
 
 
 class SerialLogFile:
-    """Writes all that happens on a line. A disk that is full ends the log, and nothing else."""
+    """Writes all traffic of a line to a file; a full disk ends only the log."""
 
     def __init__(self, path: Path) -> None:
         """Open a new file.
 
         Raises:
-            RecordingError: There is one already, or it cannot be made.
+            RecordingError: The file exists already or cannot be created.
         """
         self._path = path
         self._lines: SimpleQueue[str | None] = SimpleQueue()
@@ -164,17 +163,17 @@ class SerialLogFile:
         self._thread.start()
 
     def transfer(self, now: float, data: bytes, sent: bool) -> None:
-        """Record bytes that were read, or written."""
+        """Record bytes that were read or written."""
         if not self._ended:
             self._lines.put(format_transfer(now + self._offset, data, sent=sent))
 
     def event(self, event: Event) -> None:
-        """Record a robot that was found, or a change of the link's state."""
+        """Record a robot that was found, or a change of the link state."""
         if not self._ended:
             self._lines.put(format_event(event, event.time + self._offset))
 
     def close(self) -> None:
-        """Write what is left, and close the file; never raises."""
+        """Flush and close the file; never raises."""
         if not self._ended:
             self._lines.put(None)
         self._thread.join(CLOSE_TIMEOUT)
@@ -204,20 +203,20 @@ class SerialLogFile:
 
 
 class SerialMemory:
-    """Keeps what was read and written, and the states of the link.
+    """Keeps recent transfers and link states in memory.
 
-    Bytes are kept as tuples of plain values, which the garbage collector does not follow. One
-    thread records, another one may write meanwhile; nothing is locked.
+    Entries are tuples of plain values, which the garbage collector does not track. One thread
+    records while another may save, without locks.
     """
 
     def __init__(self, port: str, window: float) -> None:
-        """Begin with nothing; the window is how far back it reaches [s]."""
+        """Start empty; the window is the time span to keep [s]."""
         self._port, self._window = port, window
         self._transfers: deque[tuple[float, bytes, bool]] = deque()
         self._events: deque[Event] = deque(maxlen=EVENTS)
 
     def transfer(self, now: float, data: bytes, sent: bool) -> None:
-        """Keep bytes, and drop those that are older than the window."""
+        """Add a transfer, and drop those older than the window."""
         transfers = self._transfers
         transfers.append((now, data, sent))
         begin = now - self._window
@@ -225,17 +224,17 @@ class SerialMemory:
             transfers.popleft()
 
     def event(self, event: Event) -> None:
-        """Keep a robot that was found, or a change of the link's state."""
+        """Add a robot that was found, or a change of the link state."""
         self._events.append(event)
 
     @property
     def size(self) -> int:
-        """How many bytes of the line are kept."""
+        """Number of stored bytes of the line."""
         return sum(len(data) for _, data, _ in tuple(self._transfers))
 
     @property
     def about(self) -> str:
-        """The port, and how much of it is kept."""
+        """Port and extent of the stored data."""
         robot = 'no robot was found'
         for opened in tuple(self._events):
             if isinstance(opened, Opened):
@@ -248,9 +247,9 @@ class SerialMemory:
         )
 
     def save(self, folder: Path, pause: Pause) -> Path:
-        """Write what the window has, in the order in which it happened.
+        """Write the window's entries in chronological order.
 
-        The robot that was found before, and the state of then, stand at its beginning.
+        The log starts with the robot found earlier and the link state at that time.
 
         Args:
             pause: Called after each small piece of work.
@@ -279,12 +278,12 @@ class SerialMemory:
         return path
 
     def usage(self, path: Path) -> str:
-        """Return the commands that show the log."""
+        """Return commands that display the log."""
         return f'less {path}\nros2 run quad_hardware replay --ros-args -p log:={path}'
 
 
 def _since(events: tuple[Event, ...], begin: float) -> list[tuple[float, Event]]:
-    """Return events with their times, those that still held at the beginning as if of then."""
+    """Return later events with their times, and earlier ones still valid at the start."""
     last = {type(event): event for event in events if event.time < begin}
     held = sorted(last.values(), key=attrgetter('time'))
     later = [(event.time, event) for event in events if event.time >= begin]
@@ -297,7 +296,7 @@ _FOUND = {LinkState.WAITING, LinkState.RUNNING}
 
 
 class FaultWatch:
-    """Finds what begins to be wrong from one report to the next."""
+    """Detects new faults between one report and the next."""
 
     def __init__(self) -> None:
         self._boards = BoardWatch()
@@ -306,7 +305,7 @@ class FaultWatch:
         self._fallen = False
 
     def check(self, report: Report, state: RobotState) -> list[str]:
-        """Return what has begun, in words; empty as a rule."""
+        """Return the new faults as text; usually empty."""
         begun: list[str] = []
         # without its clock a restart is a silence, which is a fault already
         if self._boards.restarted(report) and report.device_time is not None:
@@ -326,13 +325,13 @@ class FaultWatch:
 
 
 class LossWatch:
-    """Distinguishes the loss of a robot that was there from the search for one."""
+    """Distinguishes the loss of a connected robot from the search for one."""
 
     def __init__(self) -> None:
         self._found = False
 
     def is_lost(self, state: LinkState) -> bool:
-        """Note the state that a link has entered; return whether that is a fault."""
+        """Record a new link state; return whether it means a fault."""
         was_found = self._found
         if state in _FOUND or state in {LinkState.CONNECTING, LinkState.STOPPED}:
             self._found = state in _FOUND

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot reports, in any protocol, in the units of the wire; and which reports cannot be.
+"""Reports of a robot, in any protocol and in wire units, and checks of their plausibility.
 
-An eight-bit checksum lets one damaged frame in 256 through, so reports are judged: joints and IMU,
-jumps, the clock of the board (when a report was made, on ours, and whether the board began anew),
-and whether servos have let go after torque off was sent.
+An eight-bit checksum passes one damaged frame in 256, so this module checks reports: joints and
+IMU, jumps, the board's clock (mapped to ours; restarts of the board), and whether servos released
+after torque off.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DEVICE_TIME_WRAP = 2**32 / 1000.0  # [s]
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """One report, with angles by motor id in the units of the wire."""
+    """One report, with angles by motor id in wire units."""
 
     arrival: float  # when its last byte came, on the monotonic clock [s]
     wire_time: float  # how long its bytes were on the line [s]
@@ -61,12 +61,12 @@ BOOT_TIME = 0.5  # [s] without a report is no shorter while the board boots
 
 
 class SampleClock:
-    """Maps the clock of the robot to ours by the fastest report so far.
+    """Maps the robot's clock to ours by the report with the least delay.
 
-    No report arrives before it was made, so the least difference of both clocks is the best; it
-    is let grow slowly, for clocks drift. When all of them are late for a while, the one that was
-    quicker was damaged, and is forgotten. Without a clock in the report, its arrival counts, less
-    half the time it was on the line.
+    No report arrives before it was made, so the smallest clock difference is the best estimate;
+    it may grow slowly, because clocks drift. If all later reports are late for a while, the
+    fastest one was damaged and is dropped. Reports without a clock get their arrival time minus
+    half the time on the line.
     """
 
     def __init__(self) -> None:
@@ -76,7 +76,7 @@ class SampleClock:
         self._late_since = math.inf
 
     def time(self, state: Report) -> float:
-        """Return when a report was made [s], on the clock of its arrival."""
+        """Return when a report was made [s], on the clock of the arrival times."""
         begun = state.arrival - state.wire_time
         if state.device_time is None:
             return state.arrival - state.wire_time / 2
@@ -99,18 +99,18 @@ class SampleClock:
 
 
 class BoardWatch:
-    """Finds restarts, after which the board counts its yaw from another heading than before.
+    """Detects restarts of the board, after which its yaw has a new zero.
 
-    Each report is compared with the one before. Where the board reports its clock, the clock
-    shows it. Elsewhere each silence that is long enough for a restart counts as one: nothing was
-    sent meanwhile, so the robot did not walk.
+    It compares each report with the previous one. If the board reports its clock, the clock shows
+    a restart. Otherwise each silence long enough for a restart counts as one: no command was sent
+    meanwhile, so the robot did not walk.
     """
 
     def __init__(self) -> None:
         self._last: Report | None = None
 
     def restarted(self, state: Report) -> bool:
-        """Add a report; return whether the board has, or may have, begun anew before it."""
+        """Add a report; return whether the board has, or may have, restarted before it."""
         last, self._last = self._last, state
         if last is None:
             return False
@@ -131,14 +131,14 @@ MAX_REFUSALS = 2  # doubtful reports in a row that are refused, before they are 
 
 
 class Plausibility:
-    """Says what is wrong with a report, if anything, as far as the robot has these motors.
+    """Checks the plausibility of reports from a robot with the given motors.
 
-    A jump, or an IMU that reports what cannot be, may be a damaged frame; when it lasts it is so.
-    Joints that cannot be are never believed.
+    A jump or an implausible IMU value may be a damaged frame; if it persists, it is accepted.
+    Implausible joints are never accepted.
     """
 
     def __init__(self, motors: Collection[int]) -> None:
-        """Begin without a report; what motors report that no joint uses is nothing."""
+        """Start without reports; motors that no joint uses are ignored."""
         self._motors = tuple(motors)
         self._last: Report | None = None
         self._refused = 0
@@ -147,7 +147,7 @@ class Plausibility:
         self.imu_problem = ''
 
     def check(self, state: Report) -> str:
-        """Return why a report cannot be; empty when it can."""
+        """Return why a report is implausible; empty if it is plausible."""
         if reason := self._joint_problem(state):
             return reason
         imu, last = _imu_problem(state), self._last
@@ -192,7 +192,7 @@ class Plausibility:
 def _turned(before: Vector, now: Vector) -> float:
     """Return the angle of the rotation between two attitudes [deg].
 
-    Roll and yaw alone say nothing about it: nose up or down, each may leap while the sum stays.
+    Roll and yaw alone do not show it: near a vertical nose, each may jump while the sum stays.
     """
     one, other = (from_rpy(*map(math.radians, attitude)) for attitude in (before, now))
     return math.degrees(math.hypot(*rotation_vector(multiply(conjugate(one), other))))
@@ -229,9 +229,9 @@ _Problem = tuple[Fault, int | None]  # what is wrong, and with which motor where
 
 
 class Confirmed(Generic[Problem]):
-    """Problems that as many reports in a row had as :data:`CONFIRMATIONS`, until as many had not.
+    """Confirms problems seen in :data:`CONFIRMATIONS` consecutive reports.
 
-    Each is confirmed, and ends, by itself: what others do meanwhile delays neither.
+    As many reports without it end a problem. Problems are counted independently of each other.
     """
 
     def __init__(self) -> None:
@@ -240,7 +240,7 @@ class Confirmed(Generic[Problem]):
         self._doubts: dict[Problem, int] = {}
 
     def take(self, seen: set[Problem]) -> set[Problem]:
-        """Add the problems of a report; return those that are confirmed now."""
+        """Add the problems of a report; return the confirmed ones."""
         doubted = seen ^ self.problems
         self._doubts = {problem: self._doubts.get(problem, 0) + 1 for problem in doubted}
         changed = {each for each in doubted if self._doubts[each] >= CONFIRMATIONS}
@@ -250,14 +250,14 @@ class Confirmed(Generic[Problem]):
 
 
 class ServoWatch:
-    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot."""
+    """Detects servos that can no longer carry the robot: silent, overloaded or too hot."""
 
     def __init__(self, motors: Collection[int]) -> None:
-        """Begin without a report; the motors are those that a joint uses."""
+        """Start without reports; the motors are those that a joint uses."""
         self._motors, self._confirmed = motors, Confirmed[_Problem]()
 
     def check(self, state: Report) -> str:
-        """Add a report; return what is wrong, as soon as several reports in a row say so."""
+        """Add a report; return the problems confirmed by several consecutive reports."""
         found = self._confirmed.take(self._read(state))
         texts = [FAULT_TEXTS[each] for each in Fault if (each, None) in found]
         hot = [motor for motor in self._motors if (Fault.OVERHEATED, motor) in found]
@@ -286,7 +286,7 @@ DELAY = 0.04
 
 
 class TorqueOffResult(Enum):
-    """What became of torque off, in words."""
+    """Result of a torque-off request."""
 
     LIMP = 'the servos are without torque'
     PULLS = 'torque off was sent, and the servos still report load: keep clear, switch it off'
@@ -299,7 +299,7 @@ class TorqueOffResult(Enum):
 
     @property
     def succeeded(self) -> bool:
-        """Whether nothing that is reported speaks against it."""
+        """Whether no report contradicts success."""
         return self in {TorqueOffResult.LIMP, TorqueOffResult.NOT_REPORTED}
 
 
@@ -310,14 +310,14 @@ def check_torque_off(
     sent_at: float | None,
     now: float,
 ) -> TorqueOffResult | None:
-    """Return what became of torque off; None while a later report may show it.
+    """Return the result of torque off; None while a later report may decide it.
 
     Args:
-        report: The newest one that can be; None without.
-        motors: Ids of those that have to let go.
-        asked_at: When it was requested [s], on the clock of the reports' arrivals.
-        sent_at: When it was given to the line [s]; None before.
-        now: When this is asked [s].
+        report: Newest plausible report; None without one.
+        motors: Ids of the motors that have to release.
+        asked_at: Time of the request [s], on the clock of the arrival times.
+        sent_at: Time when it was sent [s]; None before.
+        now: Present time [s].
     """
     found = TorqueOffResult.UNSENT if sent_at is None else TorqueOffResult.UNKNOWN
     if sent_at is not None and report is not None and _made_at(report) >= sent_at + DELAY:
@@ -332,5 +332,5 @@ def check_torque_off(
 
 
 def _made_at(report: Report) -> float:
-    """Return when a report was made at the latest [s], if no adapter held it back."""
+    """Return the latest time when a report was made [s], if no adapter delayed it."""
     return report.arrival - report.wire_time

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot on its serial port in SI units: reports become states, targets servo angles."""
+"""A robot on its serial port in SI units: converts reports to states and targets to angles."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ UNCHECKED_JOINTS = (
 
 @dataclass(frozen=True, slots=True)
 class RobotSettings:
-    """Which robot it is, and how it is read and commanded."""
+    """Settings of the robot, of reading its reports, and of commanding it."""
 
     link: LinkOptions  # where the robot is
     urdf: str  # what it is
@@ -52,10 +52,10 @@ class RobotSettings:
 
 
 class ObservedRobot:
-    """A robot whose reports become states; on a serial line, or in the log of one."""
+    """Converts a robot's reports to states; on a serial line, or in a log."""
 
     def __init__(self, settings: RobotSettings) -> None:
-        """Begin without a report.
+        """Start without a report.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
@@ -80,15 +80,15 @@ class ObservedRobot:
 
     @property
     def gravity_error(self) -> float | None:
-        """Angle between accelerometer and attitude [rad]; None while it is not known."""
+        """Angle between accelerometer and attitude [rad]; None if unknown."""
         return self._estimator.gravity_error
 
     def status(self) -> LinkStatus:
-        """Return how the link is."""
+        """Return the link status."""
         raise NotImplementedError
 
     def _report(self, report: Report) -> str:
-        """Process a report; return why it cannot be."""
+        """Process a report; return why it is implausible, or an empty text."""
         state = self._estimator.step(report)
         if state is None:
             self.on_refusal(self._estimator.refusal)
@@ -102,14 +102,14 @@ class ObservedRobot:
 
 
 class SerialRobot(ObservedRobot):
-    """Composes driver, estimation and the watch over joint commands.
+    """Combines driver, estimator and joint commander for one robot.
 
-    The callbacks are called in the thread of the driver, except ``on_warning``; everything else
-    may be called in one other thread. Times are on the monotonic clock [s].
+    The driver's thread calls the callbacks, except ``on_warning``; call all methods from one other
+    thread. Times are on the monotonic clock [s].
     """
 
     def __init__(self, settings: RobotSettings) -> None:
-        """Prepare; :meth:`start` opens the port.
+        """Set up the robot; :meth:`start` opens the port.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
@@ -153,13 +153,13 @@ class SerialRobot(ObservedRobot):
         self.timeout = self._commander.timeout
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start looking for the robot; ``begin`` is called first in the thread of the driver."""
+        """Start looking for the robot; the driver's thread calls ``begin`` first."""
         if self.black_box is not None:
             self.black_box.start()
         self._driver.start(begin)
 
     def end(self, report_loss: Callable[[str], None]) -> None:
-        """Lay the robot down where it may not be left as it is, report why, and close the port."""
+        """Lay the robot down if it cannot be left as it is, report why, and close the port."""
         while (loss := self.miss_commands()) is None:
             time.sleep(NOMINAL_PERIOD)
         if loss:
@@ -174,7 +174,7 @@ class SerialRobot(ObservedRobot):
             self._log_file.close()
 
     def status(self) -> LinkStatus:
-        """Return how the link is now."""
+        """Return the present link status."""
         return self._driver.status()
 
     # -- what may be done to it
@@ -195,21 +195,21 @@ class SerialRobot(ObservedRobot):
         return command is not None
 
     def refuse(self, error: CommandError) -> None:
-        """Count a command that is none."""
+        """Count an invalid command."""
         self.counters.received += 1
         self._commander.refuse(error)
 
     @property
     def is_commanded(self) -> bool:
-        """Whether joint commands come."""
+        """Whether joint commands are arriving."""
         return self._commander.is_commanded(time.monotonic())
 
     def miss_commands(self) -> str | None:
-        """Begin to lay the robot down when the end of its commands is a hazard.
+        """Begin to lay the robot down if missing commands are a hazard.
 
         Returns:
-            What it does, or why not; empty when there is no hazard; None to be called again,
-            for a report is awaited.
+            What it does, or why not; empty if there is no hazard; None to call again, because a
+            report is pending.
         """
         now, latest = time.monotonic(), self.latest
         imu = None if latest is None else latest.imu
@@ -219,7 +219,7 @@ class SerialRobot(ObservedRobot):
         return loss
 
     def go_down(self) -> None:
-        """Send the next targets on the way down, where a report shows the legs."""
+        """Send the next targets on the way down, if a report shows the legs."""
         now = time.monotonic()
         command = self._commander.go_down(self._place(now), now)
         if command is not None:
@@ -227,13 +227,13 @@ class SerialRobot(ObservedRobot):
 
     @property
     def goes_down(self) -> bool:
-        """Whether the robot is on its way down, because commands broke off."""
+        """Whether the robot is lying down because commands broke off."""
         return self._commander.goes_down
 
     def set_torque(self, *, on: bool) -> bool:
-        """Switch the torque off, or on where the servos are; return whether that is sent.
+        """Switch torque off, or on at the present angles; return whether this is sent.
 
-        A stream of commands that was there before does not go on where the legs have moved.
+        An earlier stream of commands does not continue if the legs have moved.
         """
         positions = self._place(time.monotonic())
         if on and positions:  # a servo that wakes goes to its last target
@@ -245,7 +245,7 @@ class SerialRobot(ObservedRobot):
         return sent
 
     def check_torque_off(self) -> TorqueOffResult | None:
-        """Return what became of torque off; None while a later report may show it."""
+        """Return the result of torque off; None while a later report may decide it."""
         motors = [servo.motor for servo in self._joints.servos]
         sent_at, now = self._driver.released_at, time.monotonic()
         return check_torque_off(self._seen, motors, self._let_go_at, sent_at, now)
@@ -253,12 +253,12 @@ class SerialRobot(ObservedRobot):
     # -- for the black box
 
     def fault(self, subject: str, text: str) -> None:
-        """Report a fault to the black box, where there is one; returns at once."""
+        """Report a fault to the black box, if there is one; never blocks."""
         if self.black_box is not None:
             self.black_box.fault(subject, text)
 
     def _note(self, subject: str, text: str) -> None:
-        """Keep a text for a report; what comes with each command or report, once."""
+        """Add a note to the black box's next report; a repeated text only once."""
         if self.black_box is not None and text != self._last_note:
             self._last_note = text
             self.black_box.note(subject, text)
@@ -310,14 +310,14 @@ class SerialRobot(ObservedRobot):
         return not self._driver.limp and self._driver.command(angles)
 
     def _obstacle(self) -> str:
-        """Return why nothing is sent to the servos."""
+        """Return why nothing can be sent to the servos; empty if it can."""
         status = self._driver.status()
         if self._driver.limp and status.state is LinkState.RUNNING:
             return 'the servos are without torque; call ~/torque with true'
         return status.detail
 
     def _place(self, now: float) -> dict[str, float]:
-        """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
+        """Return the joint positions [rad], [m]; empty without a recent report."""
         latest = self.latest
         if latest is None or latest.joints is None or now - self._arrived_at > STALE_TIME:
             return {}

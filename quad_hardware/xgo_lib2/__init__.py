@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stands in for the vendor's library of this name, and steps aside where that is installed.
+"""Stand-in for the vendor's library of this name; yields to the vendor's if installed.
 
 Modules as in the vendor's: ``client`` (XgoDog), ``feedback`` (SendStateParser), ``protocol``,
 ``registry``, ``errors``. ``xgo_lib2.__file__`` shows which of the two was imported.

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Looks for the vendor's xgo_lib2 behind our own, and puts it in our place.
+"""Finds the vendor's xgo_lib2 and replaces this stand-in by it.
 
-A colcon workspace stands in ``PYTHONPATH``, which comes before site-packages, so ours is found
-first. The import system allows a module to replace itself in :data:`sys.modules` while it is
-imported; submodules are then taken from the replacement.
+A colcon workspace is in ``PYTHONPATH``, which precedes site-packages, so the stand-in is found
+first. A module may replace itself in :data:`sys.modules` during its import; submodules then come
+from the replacement.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _OWN_MARK = Path(__file__).name  # every copy of ours has this module
 
 
 def find_vendor(name: str) -> ModuleSpec | None:
-    """Return where a package of a name is that is not ours; None where there is none."""
+    """Return the location of another package with this name; None if there is none."""
     for entry in sys.path:
         spec = PathFinder.find_spec(name, [entry])
         if _is_vendor(spec):
@@ -30,7 +30,7 @@ def find_vendor(name: str) -> ModuleSpec | None:
 
 
 def take_over(name: str) -> None:
-    """Replace the module of a name by the vendor's, where there is one."""
+    """Replace a module by the vendor's module of the same name, if installed."""
     spec = find_vendor(name)
     if spec is None or spec.loader is None:
         return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot on a serial port, one call at a time."""
+"""Synchronous client for a robot on a serial port."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _IMU = V1.functions[Register.IMU]
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """What the IMU measures."""
+    """Measurements of the IMU."""
 
     roll: float  # attitude about x [deg]
     pitch: float  # attitude about y [deg]
@@ -50,16 +50,16 @@ class Imu:
 
 
 class XgoDog:
-    """A robot, in whichever protocol it answers; close it, or use it in a with statement."""
+    """Client for a robot in either protocol; close it, or use it in a with statement."""
 
     def __init__(self, port: str = '/dev/ttyAMA0', baud: int = 0) -> None:
-        """Open a port and look for the robot.
+        """Open a port and detect the robot.
 
         Args:
             baud: Speed [bit/s]; 0 tries 2 000 000, then 115 200.
 
         Raises:
-            XgoTimeoutError: There is no answer.
+            XgoTimeoutError: The robot does not answer.
             XgoError: The port cannot be opened.
         """
         with _as_xgo_errors():
@@ -89,10 +89,10 @@ class XgoDog:
         return self._read(BATTERY)[0]
 
     def system_set_feedback(self, on: int) -> None:
-        """Request that the robot pushes its state about 50 times a second (1), or no longer (0).
+        """Enable (1) or disable (0) states pushed at about 50 Hz.
 
         Raises:
-            XgoNotSupportedError: It speaks protocol v1, which is polled.
+            XgoNotSupportedError: The robot uses protocol v1, which is polled.
             XgoError: The port was lost.
         """
         if not self._is_v2:
@@ -100,10 +100,10 @@ class XgoDog:
         self._send(Frame(Kind.WRITE, Code.FEEDBACK, bytes((bool(on),))))
 
     def read_state(self, timeout: float = TIMEOUT) -> DeviceState:
-        """Return the next state that the robot pushes.
+        """Wait for the next pushed state and return it.
 
         Raises:
-            XgoTimeoutError: None comes; was ``system_set_feedback(1)`` called?
+            XgoTimeoutError: No state arrives; was ``system_set_feedback(1)`` called?
         """
         port = self._connection.port
         deadline = time.monotonic() + timeout
@@ -123,7 +123,7 @@ class XgoDog:
         """Return attitude and acceleration.
 
         Raises:
-            XgoError: The robot does not answer; in protocol v2, it pushes no states.
+            XgoError: The robot does not answer or, in protocol v2, pushes no states.
         """
         if self._is_v2:
             self._states.clear()
@@ -138,11 +138,11 @@ class XgoDog:
         """Move one servo.
 
         Args:
-            motor_id: As in :func:`xgo_lib2.registry.feedback_slot_of`.
+            motor_id: See :func:`xgo_lib2.registry.feedback_slot_of`.
             angle: Target [deg].
 
         Raises:
-            ValueError: There is no such motor, or the angle is not finite.
+            ValueError: The motor is unknown, or the angle is not finite.
             XgoError: The port was lost.
         """
         self.write_servo_angles({motor_id: angle})
@@ -154,7 +154,7 @@ class XgoDog:
             angles: Targets by motor id [deg].
 
         Raises:
-            ValueError: There is no such motor, or an angle is not finite; nothing is sent.
+            ValueError: A motor is unknown, or an angle is not finite; nothing is sent.
             XgoError: The port was lost.
         """
         for motor, angle in angles.items():
@@ -177,7 +177,7 @@ class XgoDog:
         self._connection.port.close()
 
     def __enter__(self) -> Self:
-        """Use it in a with statement."""
+        """Return the client."""
         return self
 
     def __exit__(self, *_error: object) -> None:

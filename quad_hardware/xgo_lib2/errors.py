@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What xgo_lib2 raises.
+"""Exceptions of xgo_lib2.
 
 ::
 
@@ -13,11 +13,11 @@ from __future__ import annotations
 
 
 class XgoError(Exception):
-    """Root of all errors of this package; also a port that is missing or was lost."""
+    """Root of all errors of this package; also raised for a missing or lost port."""
 
 
 class XgoNotSupportedError(XgoError):
-    """The robot, or the protocol that it speaks, cannot do that."""
+    """The robot or its protocol does not support the request."""
 
 
 class XgoTimeoutError(XgoError, TimeoutError):

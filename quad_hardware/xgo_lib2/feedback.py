@@ -20,7 +20,7 @@ from quad_hardware.protocol import (
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """State of a robot at one moment, in the units of the wire."""
+    """State of a robot, in wire units."""
 
     battery: int  # charge [%]
     roll: float  # attitude about x [deg]
@@ -36,18 +36,18 @@ class DeviceState:
 
 
 class SendStateParser:
-    """Finds states in a stream of bytes that may be cut anywhere and damaged."""
+    """Parses states from a byte stream that may be fragmented or damaged."""
 
     def __init__(self) -> None:
         self._parser = StreamParser(V2, ROBOT_KINDS)
 
     @property
     def counters(self) -> ParserCounters:
-        """What was found so far: frames, skipped bytes, wrong checksums."""
+        """Counts of frames, skipped bytes and wrong checksums."""
         return self._parser.counters
 
     def feed_bytes(self, data: bytes) -> list[DeviceState]:
-        """Parse bytes; return the states that they complete, the oldest first."""
+        """Parse bytes; return the completed states, oldest first."""
         states = []
         for frame in self._parser.feed(data):
             if frame.kind is Kind.PUSH and frame.address == STATE.address:
@@ -59,7 +59,7 @@ class SendStateParser:
 
 
 def device_state(values: Mapping[str, tuple[float, ...]]) -> DeviceState:
-    """Return the values of a state frame by the vendor's names."""
+    """Convert a state frame to the vendor's field names."""
     (roll, pitch, yaw), (x, y, z) = values['euler2'], values['acceleration']
     return DeviceState(
         battery=int(values['battery'][0]),

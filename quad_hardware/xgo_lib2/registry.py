@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Functions by main and sub code, motors by feedback slot."""
+"""Functions by main and sub code, and motors by feedback slot."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ FUNCTIONS: Mapping[tuple[int, int], Function] = {
 
 
 def feedback_slot_of(motor_id: int) -> int:
-    """Return where a motor stands in ``joint_pos_deg`` and ``joint_vel_deg_s``.
+    """Return the index of a motor in ``joint_pos_deg`` and ``joint_vel_deg_s``.
 
     Args:
         motor_id: Ten times the leg (1 left front, 2 right front, 3 right rear, 4 left rear) plus
             the joint (1 calf, 2 thigh, 3 hip), or 51 to 54 for gripper and arm.
 
     Raises:
-        ValueError: There is no such motor.
+        ValueError: The motor is unknown.
     """
     return slot_of(motor_id)

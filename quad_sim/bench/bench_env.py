@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Steps a second of the Gymnasium environment, alone and spread over the cores.
+"""Steps per second of the Gymnasium environment, single and spread over the cores.
 
-The physics by itself in the same run is what it could be at most.
+The physics alone, measured in the same run, is the upper bound.
 """
 
 from __future__ import annotations

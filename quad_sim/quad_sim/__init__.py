@@ -12,7 +12,7 @@ Physics in virtual time, without ROS, threads or a serial port (needs MuJoCo)::
     robot.step(0.02)
     print(robot.base_pose.tilt, robot.imu.specific_force)
 
-Conventions: ``now`` is the time of the simulation in [s], ``period`` the time of a step in [s];
+Conventions: ``now`` is the simulation time in [s], ``period`` the duration of a step in [s];
 joints are in [rad], servo angles of the board in [deg] by motor id. Equal seeds repeat noise and
 damage.
 """

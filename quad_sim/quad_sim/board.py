@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's board without its serial line: servos, sensors, battery, and its own gait.
+"""The robot's board without its serial line: servos, sensors, battery, built-in gait.
 
-Figures of battery and temperatures are ours. The vendor's firmware has a trot, which registers
-VX, VY and VYAW request; this is a plain one of ours with the legs of the URDF, so that clients of
-the register protocol see the robot walk. It is not that of quad_controller.
+Battery and temperature figures are our assumptions. The vendor's firmware has a trot, commanded by
+the registers VX, VY and VYAW; this is a simple one of our own with the legs of the URDF, so that
+clients of the register protocol see the robot walk. It is not the gait of quad_controller.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ OVERLOAD_TIME = 1.0  # [s] a step of the gait is shorter
 
 @dataclass(slots=True)
 class Battery:
-    """The battery."""
+    """Model of the battery."""
 
     charge: float = 100.0  # [%]
     current: float = IDLE_CURRENT  # what is drawn from it [A]
@@ -53,7 +53,7 @@ class Battery:
 
     @property
     def percent(self) -> int:
-        """Charge as the board reports it."""
+        """Charge as reported by the board."""
         return round(self.charge)
 
     @property
@@ -63,25 +63,25 @@ class Battery:
 
 
 class ServoThermalModel:
-    """Temperatures of the servos, of first order in the square of their loads."""
+    """Servo temperatures, a first-order model driven by the squared loads."""
 
     def __init__(self, count: int) -> None:
         self.temperatures: Array = np.full(count, AMBIENT)
 
     def advance(self, loads: Array, duration: float) -> None:
-        """Warm up for a time [s] under loads (1: stall)."""
+        """Heat up for a time [s] under loads (1: stall)."""
         goal = AMBIENT + HEATING * loads * loads
         self.temperatures += (goal - self.temperatures) * min(duration / WARM_UP, 1.0)
 
 
 class Overload:
-    """How long each servo has been held at its full torque; a foot that lands is no overload."""
+    """How long each servo has been at full torque; foot touchdowns do not count."""
 
     def __init__(self, count: int) -> None:
         self._since: Array = np.zeros(count)
 
     def advance(self, loads: Array, duration: float) -> None:
-        """Be loaded for a time [s] (1: stall)."""
+        """Apply loads for a time [s] (1: stall)."""
         self._since = np.where(np.abs(loads) > FULL_LOAD, self._since + duration, 0.0)
 
     @property
@@ -102,7 +102,7 @@ STILL = 1e-3
 
 @dataclass(slots=True)
 class Stance:
-    """How the body stands over its feet, and what a host changed of it."""
+    """Body pose over the feet, and the changes a host made to it."""
 
     shift: tuple[float, float] = (0.0, 0.0)  # of the body [m]
     height: float = HEIGHT  # from hip to foot [m]
@@ -112,15 +112,15 @@ class Stance:
 
 
 class Walker:
-    """Stands or trots; one call of :meth:`step` for every set of targets."""
+    """Stands or trots; :meth:`step` generates each set of targets."""
 
     def __init__(self, urdf: str) -> None:
-        """Stand, as after switching on."""
+        """Stand, as after power-up."""
         self._robot = quadruped(urdf)
         self.reset()
 
     def reset(self) -> None:
-        """Stand, as after switching on."""
+        """Stand, as after power-up."""
         self.stance = Stance()  # how it stands; a host may change it
         # wanted speed ahead [m/s], to the left [m/s] and turning [rad/s]
         self.command: Vector = (0.0, 0.0, 0.0)
@@ -132,12 +132,12 @@ class Walker:
 
     @property
     def walking(self) -> bool:
-        """Whether feet leave the ground, or soon will."""
+        """Whether feet leave the ground now or soon."""
         wanted = self.marking_time or any(self.command)
         return wanted or self._stride > STILL or any(abs(v) > STILL for v in self._speed)
 
     def step(self, duration: float) -> Mapping[str, float]:
-        """Return the joint positions [rad] after a time [s]."""
+        """Advance by a time [s]; return the joint positions [rad]."""
         self._speed = tuple(  # type: ignore[assignment]
             now + min(max(wanted - now, -limit * duration), limit * duration)
             for now, wanted, limit in zip(self._speed, self.command, ACCELERATION, strict=True)
@@ -160,7 +160,7 @@ class Walker:
         }
 
     def _foot(self, name: str, leg: LegGeometry) -> Vector:
-        """Where the foot is to be, in base_link."""
+        """Return the target position of a foot in base_link."""
         stance, (middle, _, hip_height) = self.stance, self._robot.hip_centre
         dx, dy, dz = stance.feet.get(name, (0.0, 0.0, 0.0))
         # the place under the hip, seen from the middle between the legs
@@ -181,7 +181,7 @@ class Walker:
 
 
 def _stride(phase: float, vx: float, vy: float) -> Vector:
-    """Return where a foot is in its stride: ahead [m], to the left [m], share of the lift."""
+    """Return a foot's offset in its stride: ahead [m], left [m], fraction of the lift."""
     half = 0.5 * DUTY * STRIDE_TIME
     if phase < DUTY:
         time = half * (1.0 - 2.0 * phase / DUTY)
@@ -200,16 +200,16 @@ MAX_DURATION_RATIO = 3.0  # times the time that it should take; a robot that can
 
 
 class Turn:
-    """A turn under way; over when :meth:`rate` is zero."""
+    """A turn in progress; finished when :meth:`rate` is zero."""
 
     def __init__(self, angle: float, yaw: float, now: float) -> None:
-        """Begin to turn by an angle [rad], counter-clockwise positive, at a heading."""
+        """Start a turn by an angle [rad], positive counter-clockwise, at a heading."""
         self._left = angle
         self._yaw = yaw
         self._deadline = now + 1.0 + MAX_DURATION_RATIO * abs(angle) / TURN_RATE
 
     def rate(self, yaw: float, now: float) -> float:
-        """Return how fast to turn [rad/s] by the heading [rad], which may have wrapped around."""
+        """Return the turning rate [rad/s] for the present heading [rad], which may wrap."""
         self._left -= math.remainder(yaw - self._yaw, 2.0 * math.pi)
         self._yaw = yaw
         if abs(self._left) < TURN_DONE or now > self._deadline:
@@ -231,14 +231,14 @@ FIRMWARE: Mapping[Model, str] = {
 
 
 class Mode(IntEnum):
-    """Who gives the servos their targets."""
+    """Source of the servo targets."""
 
     SERVOS = 0  # the host, one by one
     GAIT = 1  # the board
 
 
 class Board:
-    """What both protocols talk to. Time is that of the caller and only goes forward."""
+    """Board behind both protocols. The caller supplies the time, which only increases."""
 
     def __init__(
         self,
@@ -251,11 +251,11 @@ class Board:
         mounts: Mapping[int, Mount] | None = None,
         now: float = 0.0,
     ) -> None:
-        """Switch the board on; the robot stays as it is.
+        """Power up the board; the robot keeps its posture.
 
         Args:
-            charge: Of the battery [%].
-            mounts: How servos are mounted that are not as the driver expects, by motor id.
+            charge: Charge of the battery [%].
+            mounts: Servo mountings that differ from the driver's assumptions, by motor id.
 
         Raises:
             SetupError: The robot has a joint for which the board has no servo.
@@ -303,10 +303,10 @@ class Board:
                 self._look_after_power()
 
     def switch_power(self, on: bool) -> None:
-        """Cut the supply, or give it back.
+        """Switch the power supply off or on.
 
-        Without it servos let go and the board forgets everything; with it the servos hold where
-        they are, and the board answers again after :data:`BOOT_TIME`.
+        When off, servos release and the board loses its state; when on, servos hold their
+        positions, and the board answers again after :data:`BOOT_TIME`.
         """
         if on == self._powered:
             return
@@ -316,23 +316,23 @@ class Board:
 
     @property
     def is_booted(self) -> bool:
-        """Whether the board runs its programme."""
+        """Whether the board has booted."""
         return self._powered and self._now >= self._booted_at
 
     @property
     def uptime(self) -> float:
-        """Time since the board began to run [s]."""
+        """Time since boot [s]."""
         return self._now - self._booted_at if self.is_booted else 0.0
 
     # -- sensors
 
     def measure(self) -> Measurement:
-        """Return what the sensors measure now."""
+        """Return the present sensor values."""
         self._measured = self._plant.measure()
         return self._measured
 
     def attitude(self, measured: Measurement) -> Vector:
-        """Return roll, pitch and yaw from the origin [deg]."""
+        """Return roll, pitch and yaw relative to the origin [deg]."""
         if self.imu_failed:
             return math.nan, math.nan, math.nan
         roll, pitch, yaw = measured.imu.roll_pitch_yaw
@@ -340,7 +340,7 @@ class Board:
         return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
 
     def set_origin(self) -> None:
-        """Make the present heading the origin of the yaw."""
+        """Set the yaw origin to the present heading."""
         self._yaw_origin = self.measure().imu.roll_pitch_yaw[2]
 
     def loads(self, measured: Measurement) -> tuple[float, ...]:
@@ -354,7 +354,7 @@ class Board:
 
     @property
     def faults(self) -> Fault:
-        """What the board complains about."""
+        """Present faults of the board."""
         faults = Fault(0)
         if self.battery.charge < LOW_BATTERY:
             faults |= Fault.LOW_BATTERY
@@ -371,7 +371,7 @@ class Board:
     # -- who moves the servos
 
     def take_servos(self) -> None:
-        """Hand the servos over to the host; a gait of the board ends where it is."""
+        """Give the host control of the servos; a gait of the board stops where it is."""
         self.mode = Mode.SERVOS
         self._gait_at = math.inf
         self._turn = None
@@ -379,7 +379,7 @@ class Board:
         self.walker.marking_time = False
 
     def start_gait(self) -> None:
-        """Hand the servos over to the board's gait, which begins when the robot stands."""
+        """Give the board's gait control of the servos; it starts once the robot stands."""
         if self.mode is Mode.GAIT:
             return
         self.mode = Mode.GAIT
@@ -399,7 +399,7 @@ class Board:
 
     @property
     def turning(self) -> bool:
-        """Whether a turn by an angle is under way."""
+        """Whether a turn by an angle is in progress."""
         return self._turn is not None
 
     def stand(self) -> None:
@@ -409,13 +409,13 @@ class Board:
         self.start_gait()
 
     def lie_down(self) -> None:
-        """Fold the legs and stay so."""
+        """Fold the legs and keep them folded."""
         self.take_servos()
         legs = pose_positions(Pose.LIE, self._with_arm)
         self._plant.set_targets(legs, POSE_TIME)
 
     def go_to_middle(self) -> None:
-        """Bring all servos to zero."""
+        """Move all servos to zero."""
         self.take_servos()
         self.servos.command(dict.fromkeys(MOTOR_ORDER, 0.0), POSE_TIME)
 

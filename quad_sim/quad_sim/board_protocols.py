@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's side of the protocols: registers of v1, functions and pushed states of v2.
+"""Board side of the protocols: registers of v1, functions and pushed states of v2.
 
-Every register of v1 is taken; those that move nothing here (teaching, LED, swinging of the body,
-actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
+All registers of v1 are writable; those without a function here (teaching, LED, body swing, actions
+other than 1, 2 and 255) only store their bytes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Values = dict[str, tuple[float, ...]]
 
 
 class RefusedError(Exception):
-    """A frame requests what the board does not do; it becomes a NACK."""
+    """A frame requests something unsupported; the board answers with a NACK."""
 
     def __init__(self, reason: Refusal) -> None:
         super().__init__(reason.name)
@@ -55,12 +55,12 @@ class RefusedError(Exception):
 
 
 class Functions:
-    """Answers frames of protocol v2 and pushes states."""
+    """Handles frames of protocol v2 and pushes states."""
 
     protocol = V2
 
     def __init__(self, board: Board) -> None:
-        """Begin without feedback."""
+        """Start with feedback disabled."""
         self._board = board
         self._readers: dict[int, Callable[[], Values]] = {
             Code.VERSION: self._version,
@@ -77,14 +77,14 @@ class Functions:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what a host has set, as after switching on."""
+        """Reset the host's settings, as after power-up."""
         self._on = False
         self._period = 1.0 / DEFAULT_RATE
         self.next_push = math.inf  # when a state is due [s]; infinity without feedback
         self._sequence = 0
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
-        """Carry a frame out; return what the board answers."""
+        """Execute a frame; return the board's answer."""
         try:
             answer = self._carry_out(frame)
         except RefusedError as refused:
@@ -94,7 +94,7 @@ class Functions:
         return [answer] if answer else []
 
     def push(self, now: float) -> Frame:
-        """Return the state that is due, and plan the next one."""
+        """Return the state that is due, and schedule the next one."""
         self.next_push += self._period
         if self.next_push < now:  # held up: go on from here, do not send a burst
             self.next_push = now + self._period
@@ -191,7 +191,7 @@ class Functions:
 
 
 def _unfused(measured: Measurement) -> Vector:
-    """Attitude from the accelerometer alone [deg]: wrong as soon as the robot moves."""
+    """Return the attitude from the accelerometer alone [deg]: wrong in motion."""
     x, y, z = measured.imu.specific_force
     roll, pitch = math.atan2(y, z), math.atan2(-x, math.hypot(y, z))
     return math.degrees(roll), math.degrees(pitch), 0.0
@@ -211,10 +211,10 @@ _ORIGIN, _HEIGHT, _MARK_TIME, _TURN, _MIDDLE = 0x06, 0x35, 0x3C, 0x3F, 0x5F
 
 
 class Registers:
-    """Answers frames of protocol v1."""
+    """Handles frames of protocol v1."""
 
     def __init__(self, board: Board) -> None:
-        """Begin with empty registers."""
+        """Start with empty registers."""
         self._board = board
         self._spans = ANGLE_SPANS[board.model]
         self._writers: dict[int, Callable[[bytes], None]] = {
@@ -242,11 +242,11 @@ class Registers:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what a host has written, as after switching on."""
+        """Reset the host's settings, as after power-up."""
         self._memory: dict[int, bytes] = {}
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
-        """Carry a frame out; return what the board answers."""
+        """Execute a frame; return the board's answer."""
         if frame.kind is Kind.WRITE:
             self._write(frame)
             return []
@@ -258,7 +258,7 @@ class Registers:
     # -- reading
 
     def _read(self, address: int, count: int) -> bytes | None:
-        """Return that many bytes, None from a register that cannot be read."""
+        """Return the requested bytes; None if a register is not readable."""
         function = V1.functions.get(address)
         if function is None or Access.READ not in function.access:
             return None
@@ -379,16 +379,16 @@ class Registers:
         self._board.start_gait()
 
     def _foot(self, leg: int) -> tuple[float, float, float]:
-        """Return how far a host has moved a foot [m]."""
+        """Return the foot offset set by the host [m]."""
         x, y, z = _FEET[3 * (leg - 1) : 3 * leg]
         return self._signed(x) / 1000.0, self._signed(y) / 1000.0, HEIGHT - self._height(z)
 
     def _height(self, address: int) -> float:
-        """Return a height that was written, taken as one from hip to foot [m]."""
+        """Return the written height, interpreted from hip to foot [m]."""
         return self._decoded(address) / 1000.0 if address in self._memory else HEIGHT
 
     def _signed(self, address: int) -> float:
-        """Return what was written to a register around zero, in its unit; zero without."""
+        """Return the signed value of a register in its unit; 0 if not written."""
         data = self._memory.get(address)
         if data is None or data[0] in NEUTRAL:
             return 0.0
@@ -404,23 +404,23 @@ SERVO_PERIOD = 1 / 26  # [s] in which the developer firmware measures the servos
 
 
 class DeveloperFirmware(Registers):
-    """Takes angles of the legs and torque as in v1, and pushes states unasked."""
+    """Accepts leg angles and torque as in v1, and pushes states unsolicited."""
 
     protocol = DEVELOPER
     big_endian = False  # its floats, whose order the vendor's page does not say
 
     def restart(self) -> None:
-        """Begin anew, as after switching on."""
+        """Reset, as after power-up."""
         super().restart()
         self.next_push = self._measure_at = 0.0  # [s] when a state is due, and the servos are
         self._motors = b''
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
-        """Carry a frame out; nothing is answered."""
+        """Execute a frame; never answers."""
         return super().handle(frame, now) if frame.address in DEVELOPER.functions else []
 
     def push(self, now: float) -> Frame:
-        """Return the state that is due, and plan the next one."""
+        """Return the state that is due, and schedule the next one."""
         self.next_push = max(self.next_push, now) + 1.0 / DEFAULT_RATE
         if now >= self._measure_at:
             self._measure_at = max(self._measure_at + SERVO_PERIOD, now)
@@ -432,5 +432,5 @@ class DeveloperFirmware(Registers):
 
 
 def _clipped(value: float, step: float) -> float:
-    """Return a value that fits a 16-bit number in steps of this size."""
+    """Clamp a value to the range of a 16-bit number with this step size."""
     return min(max(value, -INT16 * step), INT16 * step)

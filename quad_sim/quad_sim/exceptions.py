@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that quad_sim raises.
+"""Exceptions of quad_sim.
 
 ::
 
-    SimulationError (RuntimeError)   the robot cannot be simulated, or its physics blew up
+    SimulationError (RuntimeError)   the robot cannot be simulated, or became unstable
     ├── SetupError (ValueError)      an option of the simulated robot is wrong
-    └── TargetError (ValueError)     targets of the servos are refused; nothing moves
+    └── TargetError (ValueError)     servo targets are rejected; nothing moves
 """
 
 from __future__ import annotations
 
 
 class SimulationError(RuntimeError):
-    """The robot cannot be simulated, or its physics blew up.
+    """The robot cannot be simulated, or its simulation became unstable.
 
     Scenarios: MuJoCo is not installed, a servo far too stiff for the time step.
     """
@@ -27,7 +27,7 @@ class SetupError(SimulationError, ValueError):
 
 
 class TargetError(SimulationError, ValueError):
-    """Targets of the servos are refused.
+    """Servo targets are rejected.
 
     Scenarios: NaN or infinite positions, a wrong number of joints, an unknown joint name.
     """

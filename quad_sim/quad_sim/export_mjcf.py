@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``export_mjcf``: the simulated robot as a model for MuJoCo."""
+"""``export_mjcf``: writes the simulated robot as a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .plant import parse_servo
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Write the robot as MJCF; return 0 when it is written."""
+    """Write the robot as MJCF; return the exit code."""
     parser = argparse.ArgumentParser(
         description='Write the simulated robot as MJCF, for trainers that simulate it themselves.',
         allow_abbrev=False,

@@ -51,7 +51,7 @@ def main() -> None:
 
 @contextmanager
 def _stopped_by_signals(server: Server) -> Iterator[None]:
-    """End the server at SIGINT and SIGTERM."""
+    """Stop the server on SIGINT and SIGTERM."""
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         server.stop()
@@ -65,7 +65,7 @@ def _stopped_by_signals(server: Server) -> Iterator[None]:
 
 
 def _report_ready(description: str, manager: ServiceManager) -> None:
-    """Print what is simulated, and report to the supervisor of this process."""
+    """Print the configuration, and notify the supervisor of this process."""
     sys.stdout.write(f'fake_xgo: {description}\n')
     sys.stdout.flush()
     manager.report('READY=1')

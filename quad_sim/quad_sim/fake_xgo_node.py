@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot's node: pushes and faults by service, and where the robot really is."""
+"""ROS node of the simulated robot: services for pushes and faults; publishes ground truth."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ SWITCH_INTERVAL = 0.0005  # [s] how long a callback may keep the robot from the 
 
 
 class FakeXgoNode(Node):
-    """Offers ``~/push``, ``~/fault`` and ``~/stand``, and publishes what physics knows."""
+    """Provides ``~/push``, ``~/fault`` and ``~/stand``, and publishes the ground truth."""
 
     def __init__(self, server: Server, simulation: Simulation) -> None:
-        """Make the services; the robot lives in the server's loop."""
+        """Create the services; the robot runs in the server's loop."""
         super().__init__('fake_xgo')
         self._server, self._simulation = server, simulation
         self.create_service(Push, '~/push', self._push)
@@ -131,10 +131,10 @@ def serve_with_ros(
     ros_arguments: Sequence[str],
     report_ready: Callable[[], None],
 ) -> None:
-    """Run the robot in a thread and its node in this one, until signal handlers end the server.
+    """Run the robot in a thread and its node here, until a signal stops the server.
 
     Raises:
-        SimulationError: What ended the robot.
+        SimulationError: The simulation failed.
     """
     init_ros(ros_arguments)
     node = FakeXgoNode(server, simulation)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What may go wrong with a robot and its serial line, and when.
+"""Faults of a robot and its serial line, and their schedule.
 
-A fault is written ``KIND[,name=value...]``: ``drop,rate=0.01`` or ``silence,at=5,for=2``.
+Faults have the syntax ``KIND[,name=value...]``: ``drop,rate=0.01`` or ``silence,at=5,for=2``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .exceptions import SetupError
 
 
 class FaultKind(Enum):
-    """The faults that there are."""
+    """Kinds of faults."""
 
     DROP = 'drop'  # bytes are lost, both ways
     FLIP = 'flip'  # a bit of a byte is inverted, both ways
@@ -36,7 +36,7 @@ FOREVER = math.inf
 
 
 class Setting(NamedTuple):
-    """A detail of a fault."""
+    """A parameter of a fault."""
 
     default: float
     lowest: float
@@ -61,7 +61,7 @@ SETTINGS: Mapping[FaultKind, Mapping[str, Setting]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that goes wrong for a time."""
+    """A fault with its start and duration."""
 
     kind: FaultKind  # what
     start: float = 0.0  # from when [s], since the start of the robot
@@ -69,19 +69,19 @@ class Fault:
     values: Mapping[str, float] = field(default_factory=dict)  # its details by name
 
     def __getitem__(self, name: str) -> float:
-        """Return a detail, or its default."""
+        """Return a parameter, or its default."""
         return self.values.get(name, SETTINGS[self.kind][name].default)
 
     @property
     def end(self) -> float:
-        """When it is over [s]."""
+        """End time [s]."""
         return self.start + self.duration
 
 
 def make_fault(
     name: str, settings: Iterable[str], start: float = 0.0, duration: float = FOREVER
 ) -> Fault:
-    """Return a fault from words ``name=value``; ``at`` and ``for`` go before the arguments [s].
+    """Create a fault from words ``name=value``; ``at`` and ``for`` override the arguments [s].
 
     Raises:
         SetupError: A word is unknown; the message lists the known ones.
@@ -116,7 +116,7 @@ def make_fault(
 
 
 def parse_fault(text: str) -> Fault:
-    """Return a fault that is written ``KIND[,name=value...]``.
+    """Parse a fault in the syntax ``KIND[,name=value...]``.
 
     Raises:
         SetupError: The text is wrong; the message lists the known faults.
@@ -126,32 +126,32 @@ def parse_fault(text: str) -> Fault:
 
 
 class FaultPlan:
-    """The faults of a robot, over its time."""
+    """Schedule of a robot's faults."""
 
     def __init__(self, faults: Iterable[Fault] = ()) -> None:
-        """Plan faults."""
+        """Schedule faults."""
         self._faults = list(faults)
 
     def add(self, fault: Fault) -> None:
-        """Plan one more."""
+        """Schedule another fault."""
         self._faults.append(fault)
 
     def end_all(self) -> None:
-        """Forget all faults, those that are still to come too."""
+        """Cancel all faults, including future ones."""
         self._faults.clear()
 
     def active(self, kind: FaultKind, now: float) -> Fault | None:
-        """Return the fault of a kind that goes on at a time, the one planned last."""
+        """Return the active fault of a kind at a time; the latest added wins."""
         for fault in reversed(self._faults):
             if fault.kind is kind and fault.start <= now < fault.end:
                 return fault
         return None
 
     def next_change(self, now: float) -> float:
-        """Return when something begins or ends next [s]; infinity for never."""
+        """Return the next time a fault begins or ends [s]; infinity if none."""
         times = (time for fault in self._faults for time in (fault.start, fault.end))
         return min((time for time in times if time > now), default=FOREVER)
 
     def prune(self, now: float) -> None:
-        """Forget what is over."""
+        """Remove the faults that have ended."""
         self._faults = [fault for fault in self._faults if fault.end > now]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The command line of the simulated robot, and the robot that it describes."""
+"""Command line of the simulated robot; builds the robot from it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NOISE = {'none': NONE, 'board': BOARD}
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A robot and its line, ready to be served."""
+    """A robot and its line, ready to run."""
 
     plant: Plant
     board: Board  # its board
@@ -38,7 +38,7 @@ class Simulation:
 
 
 def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
-    """Read the command line; end the process with 2 where it is wrong."""
+    """Parse the command line; exit with 2 if it is invalid."""
     parser = argparse.ArgumentParser(
         prog='fake_xgo',
         description='A simulated XGO on a pseudo-terminal that speaks its serial protocols.',
@@ -89,7 +89,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def build(options: argparse.Namespace) -> Simulation:
-    """Make the robot that a command line describes; it is at rest when this returns.
+    """Build the robot from the command line; return it at rest.
 
     Raises:
         SetupError: An option is wrong.
@@ -129,10 +129,10 @@ def build(options: argparse.Namespace) -> Simulation:
 
 
 def parse_mount(text: str) -> tuple[int, Mount]:
-    """Return a motor id and how its servo sits, from ``ID=SIGN[,DEGREES]``.
+    """Parse ``ID=SIGN[,DEGREES]`` into a motor id and its servo mounting.
 
     Raises:
-        SetupError: The text is wrong; the message names what is right.
+        SetupError: The text is wrong; the message shows the syntax.
     """
     motor, _, rest = text.partition('=')
     sign, _, offset = rest.partition(',')
@@ -144,7 +144,7 @@ def parse_mount(text: str) -> tuple[int, Mount]:
 
 
 def _choose_speeds(name: str, v1_baud: int) -> Mapping[int, Protocol]:
-    """Return what the board speaks, by baud rate [bit/s]."""
+    """Return the board's protocols by baud rate [bit/s]."""
     protocols = _PROTOCOLS[name]
     if v1_baud <= 0:
         raise SetupError(f'--v1-baud {v1_baud}: give bits a second, e.g. {V1.baud}')

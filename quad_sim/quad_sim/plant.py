@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""How the servos follow their targets, and a robot that is nothing but servos.
+r"""Servo model, and a kinematic robot that consists of servos only.
 
 The torque on a joint is
 
 .. math:: \tau = \mathrm{clamp}(k_p\,\mathrm{dead}(q^* - q) - k_v \dot q, \pm\tau_{max}) - d \dot q
 
 with the largest torque from the URDF. ``dead`` is zero within the free width: the dead band, and
-half the backlash to either side. Of the passive damping :math:`d`, a stall torque of 0.46 N m
-and a no-load speed of 9.2 rad/s give 0.05 N m s/rad: it is the torque-speed line of the motor, and
-therefore outside the clamp. A target arrives after the delay, with the next refresh; it is
-approached along a straight line.
+half the backlash to either side. A stall torque of 0.46 N m and a
+no-load speed of 9.2 rad/s contribute 0.05 N m s/rad to the passive damping :math:`d`: this is the
+torque-speed line of the motor, and therefore outside the clamp. A target takes effect after the
+delay, at the next refresh; the set-point then moves to it linearly.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MAX_DELAY = 1.0  # [s]
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters:
-    """What a servo does with its target."""
+    """Parameters of a servo."""
 
     stiffness: float  # torque per position error, k_p [N m/rad]
     velocity_gain: float = 0.0  # torque against speed inside the clamp, k_v [N m s/rad]
@@ -49,7 +49,7 @@ class ServoParameters:
     refresh: float = 0.0  # time between two targets that the servo takes over [s]; 0: all
 
     def __post_init__(self) -> None:
-        """Refuse numbers that are no servo."""
+        """Reject invalid numbers."""
         for name in self.__slots__:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -63,17 +63,17 @@ class ServoParameters:
 
     @property
     def free_width(self) -> float:
-        """Error to either side that moves nothing [rad]."""
+        """Error to either side that causes no torque [rad]."""
         return self.deadband + 0.5 * self.backlash
 
 
 class ServoModel(Enum):
-    """Servos by name; anything else is a ServoParameters.
+    """Named servo models; use ServoParameters for any other.
 
     NOMINAL is the default: published figures of the vendor's servos and of the serial bus servos
-    that they are made of (sources in the README). VENDOR_RL is the actuator in the vendor's newer
-    training environment (luwu_mjlab): policies trained there expect it. FIRM is no real servo, but
-    stiff enough to show what a gait or policy does when the servos follow.
+    that they are based on (sources in the README). VENDOR_RL is the actuator of the vendor's newer
+    training environment (luwu_mjlab), which policies trained there expect. FIRM is not a real
+    servo, but stiff enough to show a gait or policy with ideal tracking.
     """
 
     NOMINAL = 'nominal'
@@ -82,7 +82,7 @@ class ServoModel(Enum):
 
     @property
     def parameters(self) -> ServoParameters:
-        """The numbers of the model."""
+        """Parameters of the model."""
         return _PARAMETERS[self]
 
 
@@ -104,10 +104,10 @@ JAW = ServoParameters(stiffness=400.0, velocity_gain=4.0, damping=1.0, armature=
 
 
 def parse_servo(text: str) -> ServoParameters:
-    """Return a servo from its name, or from ``name=value,...``.
+    """Parse a servo model's name, or ``name=value,...``.
 
     Raises:
-        SetupError: The text is wrong; the message names what is right.
+        SetupError: The text is wrong; the message lists valid input.
     """
     known = [model.value for model in ServoModel]
     if text in known:
@@ -133,10 +133,10 @@ Targets = Mapping[str, float] | Sequence[float] | Array
 
 
 class TargetRamp:
-    """The set-points of all servos, one value for each time step."""
+    """Set-points of all servos, advanced in time steps."""
 
     def __init__(self, joints: Sequence[Joint], timestep: float, values: Array) -> None:
-        """Stand still; values are in the order of the joints, a call takes a timestep [s]."""
+        """Start at rest; values are in joint order; each advance takes a timestep [s]."""
         self._index = {joint.name: index for index, joint in enumerate(joints)}
         self._lower = np.array([joint.limits.lower for joint in joints])
         self._upper = np.array([joint.limits.upper for joint in joints])
@@ -150,28 +150,28 @@ class TargetRamp:
 
     @property
     def goal(self) -> Array:
-        """Where the set-points go [rad], a copy."""
+        """Final set-points [rad], a copy."""
         return np.array(self._goal)
 
     def jump(self, values: Array) -> None:
-        """Be at other set-points at once."""
+        """Set the set-points at once."""
         self.values[:] = values
         self._goal[:] = values
         self._slope[:] = 0.0
         self._next_arrival = self._last_arrival = self._step
 
     def approach(self, targets: Targets, duration: float) -> None:
-        """Begin to approach targets in a time [s]; other joints go on with what they do.
+        """Start ramping to targets in a time [s]; other joints continue.
 
-        What lies beyond a limit is taken to the limit, as servos do.
+        Targets are clamped to the limits, as in the servos.
 
         Raises:
-            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or the count is wrong.
         """
         self.begin(*self.checked(targets), duration)
 
     def begin(self, indices: NDArray[np.intp], values: Array, duration: float) -> None:
-        """Do what :meth:`approach` does with what :meth:`checked` returned."""
+        """Start ramping to the result of :meth:`checked`, like :meth:`approach`."""
         goal = np.minimum(np.maximum(values, self._lower[indices]), self._upper[indices])
         steps = max(round(duration / self._timestep), 1)
         self._goal[indices] = goal
@@ -183,7 +183,7 @@ class TargetRamp:
             self._plan()
 
     def advance(self) -> None:
-        """Go one time step on."""
+        """Advance by one time step."""
         if self._step == self._last_arrival:
             return
         self._step += 1
@@ -200,10 +200,10 @@ class TargetRamp:
         self._last_arrival = int(coming.max()) if len(coming) else self._step
 
     def checked(self, targets: Targets) -> tuple[NDArray[np.intp], Array]:
-        """Return indices and values of targets, and change nothing.
+        """Check targets; return their indices and values without side effects.
 
         Raises:
-            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or the count is wrong.
         """
         if isinstance(targets, Mapping):
             unknown = sorted(targets.keys() - self._index.keys())
@@ -233,9 +233,9 @@ _FEET = 4
 
 
 class KinematicRobot:
-    """A robot held up in the air: servos follow at once, and nothing else moves.
+    """A robot held in the air: servos follow at once, and nothing else moves.
 
-    Costs next to nothing and needs no MuJoCo; good for the serial side, not for gaits.
+    It is cheap and does not need MuJoCo; suited to test the serial side, not gaits.
     """
 
     def __init__(
@@ -246,7 +246,7 @@ class KinematicRobot:
         noise: Noise = NONE,
         seed: int = 0,
     ) -> None:
-        """Hold the robot at a pose [rad], zero for those left out; :meth:`measure` adds noise.
+        """Hold the robot in a pose [rad], by default zero; :meth:`measure` adds noise.
 
         Raises:
             SetupError: The pose names joints that the robot lacks.
@@ -273,29 +273,29 @@ class KinematicRobot:
 
     @property
     def base_pose(self) -> BasePose:
-        """Level, and where it was."""
+        """Constant level pose."""
         return BasePose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
     @property
     def base_velocity(self) -> BaseVelocity:
-        """None."""
+        """Always zero."""
         return BaseVelocity((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     @property
     def foot_contacts(self) -> tuple[bool, ...]:
-        """None: it is held up in the air."""
+        """No contacts: the robot is held in the air."""
         return (False,) * _FEET
 
     @property
     def joint_targets(self) -> Array:
-        """Set-points now [rad]."""
+        """Present set-points [rad]."""
         return np.array(self._ramp.values)
 
     def set_targets(self, targets: Targets, duration: float | None = None) -> None:
         """Set new targets [rad]; servos without torque stay where they are.
 
         Raises:
-            TargetError: As :meth:`quad_sim.physics.Robot.set_targets`.
+            TargetError: See :meth:`quad_sim.physics.Robot.set_targets`.
         """
         self._ramp.checked(targets)
         if not isinstance(targets, Mapping):
@@ -307,7 +307,7 @@ class KinematicRobot:
     def set_torque(
         self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
     ) -> None:
-        """Switch servos on or off; one that is off does not fall or move to new targets."""
+        """Switch servos on or off; one without torque neither falls nor follows targets."""
         names = self.joint_names if joints is None else tuple(joints)
         self._on |= dict.fromkeys(names, on)
         missed = {name: self._missed.pop(name) for name in names if on and name in self._missed}
@@ -315,11 +315,11 @@ class KinematicRobot:
             self._ramp.approach(missed, 0.0)
 
     def torque_on(self, joint: str) -> bool:
-        """Return whether a servo holds."""
+        """Return whether a servo has torque."""
         return self._on[joint]
 
     def push(self, force: Vector, duration: float = 0.1) -> None:
-        """Refuse: what is held does not move.
+        """Raise SetupError: a held robot cannot move.
 
         Raises:
             SetupError: Always.
@@ -327,7 +327,7 @@ class KinematicRobot:
         raise SetupError('a robot without physics cannot be pushed; leave out --physics none')
 
     def kick(self, velocity: Vector) -> None:
-        """Refuse, as :meth:`push` does.
+        """Raise SetupError, as :meth:`push` does.
 
         Raises:
             SetupError: Always.
@@ -335,7 +335,7 @@ class KinematicRobot:
         raise SetupError('a robot without physics cannot be kicked; leave out --physics none')
 
     def step(self, duration: float) -> None:
-        """Advance the time [s]."""
+        """Advance by a duration [s]."""
         self._remaining_steps += duration / TIMESTEP
         count = int(self._remaining_steps + 1e-6)
         self._remaining_steps -= count
@@ -345,7 +345,7 @@ class KinematicRobot:
             self._ramp.advance()
 
     def measure(self) -> Measurement:
-        """Return what the sensors measure."""
+        """Return the sensor values."""
         values = self.joint_targets
         level = (0.0, 0.0, 0.0)
         truth = Measurement(

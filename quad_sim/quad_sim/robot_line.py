@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot at the end of its serial line: bytes in, bytes out, in a time that is handed in.
+"""The robot's end of a simulated serial line: bytes in, bytes out, at given times.
 
-A pseudo-terminal moves everything at once; here bytes take as long as the baud rate says, and may
-be damaged on the way.
+A pseudo-terminal transfers bytes at once; here they take the time that the baud rate implies, and
+may be damaged on the way.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BITS_PER_BYTE = 10  # 8N1: start, eight data bits, stop
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """Bytes at the end of a line."""
+    """Bytes that reach the end of a line at a time."""
 
     end: float  # when the last of them is there [s]
     data: bytes  # what is left of them
@@ -36,7 +36,7 @@ class Wire:
     """One direction of a serial line."""
 
     def __init__(self, faults: FaultPlan, muted_by: FaultKind, seed: int, *, slow: bool) -> None:
-        """Lay a wire that one of the faults mutes."""
+        """Create a wire that a given kind of fault mutes."""
         self._faults = faults
         self._muted_by = muted_by
         self._random = random.Random(seed)  # noqa: S311  for tests, not for secrets
@@ -45,7 +45,7 @@ class Wire:
         self._queue: deque[Arrival] = deque()
 
     def put(self, data: bytes, now: float, baud: int) -> None:
-        """Put bytes on the wire; they follow those that are still on it."""
+        """Put bytes on the wire, behind those still on it."""
         seconds = BITS_PER_BYTE / baud
         end = max(now, self._free_at) + len(data) * seconds
         self._free_at = end
@@ -57,19 +57,19 @@ class Wire:
         )
 
     def take(self, now: float) -> list[Arrival]:
-        """Return what has arrived, in order."""
+        """Return the bytes that have arrived, in order."""
         arrived = []
         while self._queue and self._queue[0].end <= now:
             arrived.append(self._queue.popleft())
         return arrived
 
     def clear(self) -> None:
-        """Forget what is on the way."""
+        """Discard the bytes on the wire."""
         self._queue.clear()
 
     @property
     def next_arrival(self) -> float:
-        """When the next bytes are there [s]; infinity for none."""
+        """Time of the next arrival [s]; infinity if none."""
         return self._queue[0].end if self._queue else math.inf
 
     def _damage(self, data: bytes, now: float) -> bytes:
@@ -92,7 +92,7 @@ WINDOW = 20_000  # commands that are looked back
 
 @dataclass(frozen=True, slots=True)
 class CommandTiming:
-    """Of joint commands on the wire; percentiles of nothing are NaN."""
+    """Timing of joint commands on the wire; percentiles without data are NaN."""
 
     # times from the last byte of a state to the first byte of the next command in [s]
     latencies: tuple[float, ...] = ()
@@ -100,7 +100,7 @@ class CommandTiming:
     deviations: tuple[float, ...] = ()
 
     def __add__(self, other: CommandTiming) -> CommandTiming:
-        """Return both together."""
+        """Merge two sets of timings."""
         return CommandTiming(self.latencies + other.latencies, self.deviations + other.deviations)
 
     def latency(self, share: float) -> float:
@@ -113,25 +113,25 @@ class CommandTiming:
 
 
 class CommandTimes:
-    """Collects them; times are those of the robot [s]."""
+    """Collects command timing; times are those of the robot [s]."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Start without data."""
         self.clear()
 
     def clear(self) -> None:
-        """Forget all."""
+        """Discard all data."""
         self._state_at: float | None = None
         self._command_at: float | None = None
         self._latencies: deque[float] = deque(maxlen=WINDOW)
         self._intervals: deque[float] = deque(maxlen=WINDOW)
 
     def sent(self, now: float) -> None:
-        """Note that bytes have arrived at the host."""
+        """Record that bytes have arrived at the host."""
         self._state_at = now
 
     def commanded(self, begin: float) -> None:
-        """Note the first byte of a command."""
+        """Record the first byte of a command."""
         # a second command after a state is no answer to it, nor is one that was there before it
         if self._state_at is not None and begin > self._state_at:
             self._latencies.append(begin - self._state_at)
@@ -141,7 +141,7 @@ class CommandTimes:
         self._command_at = begin
 
     def timing(self) -> CommandTiming:
-        """Return what came together."""
+        """Return the collected timing."""
         middle = _percentile(sorted(self._intervals), 0.5)
         return CommandTiming(
             tuple(self._latencies), tuple(abs(each - middle) for each in self._intervals)
@@ -159,7 +159,7 @@ QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
 
 @dataclass(slots=True)
 class LineStatistics:
-    """What the robot has received."""
+    """Counters of what the robot has received."""
 
     frames: int = 0  # valid frames
     hurried: int = 0  # frames that followed the one before too closely, and were not carried out
@@ -167,7 +167,7 @@ class LineStatistics:
 
 
 class RobotLine:
-    """A board, its serial line in both directions, and the faults of both."""
+    """A board with its serial line in both directions, and the faults of both."""
 
     def __init__(
         self,
@@ -182,9 +182,9 @@ class RobotLine:
         """Connect a board.
 
         Args:
-            speeds: What it speaks, by baud rate [bit/s]; v1 and v2 at their own for None.
-            command_gap: Least time between two frames of the host, but in v2 [s]; one that comes
-                sooner is lost, as the vendor warns.
+            speeds: Protocols by baud rate [bit/s]; None: v1 and v2 at their own rates.
+            command_gap: Shortest time between two host frames [s], except in v2; an earlier frame
+                is lost, as the vendor warns.
         """
         self.faults = faults or FaultPlan()  # what goes wrong; may be added to
         self.statistics = LineStatistics()  # what the robot has received
@@ -210,20 +210,20 @@ class RobotLine:
         self._now = 0.0
 
     def set_baud(self, baud: int) -> None:
-        """Follow the speed that the host has set [bit/s]."""
+        """Set the line speed that the host has chosen [bit/s]."""
         if baud != self.baud:
             self.baud = baud
             self._forget_partial_frames()
 
     def receive(self, data: bytes, now: float) -> None:
-        """Receive bytes that the host has begun to send."""
+        """Receive bytes that the host has started to send."""
         if self.baud not in self._by_baud:
             self.statistics.garbled += len(data)
             return
         self.to_robot.put(data, now, self.baud)
 
     def advance(self, now: float) -> bytes:
-        """Advance the time; return what has arrived at the host by then."""
+        """Advance the time; return the bytes that have reached the host by then."""
         self._change_faults(now)
         while (arrival := min(self.to_robot.next_arrival, self._push_time)) <= now:
             if self._push_time <= self.to_robot.next_arrival:
@@ -242,7 +242,7 @@ class RobotLine:
 
     @property
     def next_event(self) -> float:
-        """When :meth:`advance` has something to do next, without new bytes [s]."""
+        """Time at which :meth:`advance` is needed next, without new bytes [s]."""
         return min(
             self.to_robot.next_arrival,
             self.to_host.next_arrival,

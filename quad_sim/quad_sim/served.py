@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot in physics behind a serial port, in a process of its own, that is watched from here.
+"""Runs and observes a simulated robot behind a serial port, in its own process.
 
-What runs against it goes the whole way: servos, board, serial line, and clocks that do not wait.
+Clients exercise the full chain in real time: servos, board and serial line.
 """
 
 from __future__ import annotations
@@ -40,56 +40,56 @@ ANSWER_TIME = 40.0  # [s]
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What was seen of a robot since :meth:`ServedRobot.begin`."""
+    """Observations of a robot since :meth:`ServedRobot.begin`."""
 
     metered: Metered  # where it went, and what that cost
     # when its commands came; nothing without real clocks
     timing: CommandTiming = field(default_factory=CommandTiming)
 
     def __add__(self, other: Watched) -> Watched:
-        """Return both together."""
+        """Merge two observations."""
         return Watched(self.metered + other.metered, self.timing + other.timing)
 
 
 class WatchedRobot:
-    """A robot in physics that is put on its feet, kicked and measured."""
+    """A robot in physics that can be reset, kicked and observed."""
 
     def __init__(self, robot: Robot, meter: Meter, line: RobotLine | None = None) -> None:
-        """Measure a robot, and when its commands come where it has a line."""
+        """Observe a robot and, if it has a line, the timing of its commands."""
         self._robot, self._meter, self._line = robot, meter, line
         # how it stands up: arguments of its reset
         self.start: Mapping[str, Any] = {}
 
     def stand(self) -> None:
-        """Put the robot on its feet where it began, whatever it did before."""
+        """Reset the robot to standing at its start."""
         self._robot.reset(**self.start)
         self.begin()
 
     def kick(self, x: float, y: float) -> None:
-        """Change its velocity at once, ahead and to the left [m/s]."""
+        """Change its velocity instantly, forward and left [m/s]."""
         self._robot.kick((x, y, 0.0))
 
     def begin(self) -> None:
-        """Begin to watch it anew."""
+        """Restart the observation."""
         self._meter.begin()
         if self._line is not None:
             self._line.command_times.clear()
 
     def read(self) -> Watched:
-        """Return what was seen since."""
+        """Return the observations since :meth:`begin`."""
         line = self._line
         timing = CommandTiming() if line is None else line.command_times.timing()
         return Watched(self._meter.read(), timing)
 
 
 class ServedRobot:
-    """Makes a robot that lives in real time, for a ``with`` block."""
+    """Runs a robot in real time, for a ``with`` block."""
 
     def __init__(self, *arguments: str) -> None:
-        """Prepare; the robot stands as soon as the block begins.
+        """Set up the robot; it starts with the block.
 
         Args:
-            arguments: Of fake_xgo, but for ``--link`` and ``--start``.
+            arguments: Arguments of fake_xgo, except ``--link`` and ``--start``.
         """
         self._arguments = arguments
         self.port = ''  # path of its serial port
@@ -98,7 +98,7 @@ class ServedRobot:
         """Start the process.
 
         Raises:
-            SimulationError: It did not start; the message has the reason.
+            SimulationError: The process did not start; the message has the reason.
         """
         self._folder = tempfile.TemporaryDirectory(prefix='quad_sim-')
         self.port = str(Path(self._folder.name) / 'xgo')
@@ -127,19 +127,19 @@ class ServedRobot:
         self._folder.cleanup()
 
     def stand(self) -> None:
-        """Do as :meth:`WatchedRobot.stand`."""
+        """See :meth:`WatchedRobot.stand`."""
         self._ask('stand')
 
     def kick(self, x: float, y: float) -> None:
-        """Do as :meth:`WatchedRobot.kick`."""
+        """See :meth:`WatchedRobot.kick`."""
         self._ask('kick', x, y)
 
     def begin(self) -> None:
-        """Do as :meth:`WatchedRobot.begin`."""
+        """See :meth:`WatchedRobot.begin`."""
         self._ask('begin')
 
     def read(self) -> Watched:
-        """Do as :meth:`WatchedRobot.read`."""
+        """See :meth:`WatchedRobot.read`."""
         return cast('Watched', self._ask('read'))
 
     def _ask(self, request: str, *arguments: float) -> object:
@@ -162,7 +162,7 @@ class ServedRobot:
 
 
 def serve() -> None:
-    """Serve a robot until the pipe is closed whose number is the first argument."""
+    """Serve a robot until the pipe closes whose number is the first argument."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends by it, and closes the pipe
     number, *argv = sys.argv[1:]
     with Connection(int(number)) as pipe:
@@ -175,7 +175,7 @@ def serve() -> None:
 
 
 class _Watch:
-    """Does to a robot what is asked for."""
+    """Executes requests on a robot."""
 
     def __init__(
         self, simulation: Simulation, argv: Sequence[str], terminal: PseudoTerminal
@@ -192,7 +192,7 @@ class _Watch:
         self._server = Server(robot, simulation.line, terminal, meter.sample)
 
     def answer(self, pipe: Connection) -> None:
-        """Carry requests out until there will be no more."""
+        """Serve requests until the pipe closes."""
         with closing(self._server), ThreadPoolExecutor(1) as pool:
             life = pool.submit(self._server.run)
             try:

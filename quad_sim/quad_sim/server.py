@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot in real time, between a pseudo-terminal and the clock: one loop."""
+"""Runs the simulated robot in real time on a pseudo-terminal, in one loop."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ _BAUD_OF = {
 
 
 class PseudoTerminal:
-    """The robot's end of a serial line; the other end is a device that any program can open."""
+    """The robot's end of a serial line; the other end is a device for any program."""
 
     def __init__(self, link: Path) -> None:
-        """Make the device and the link.
+        """Create the device and the link.
 
         Raises:
-            SetupError: Something else is there, or the link cannot be made.
+            SetupError: The path is in use, or the link cannot be created.
         """
         self.link = link  # path that leads to the device, whatever its name is
         self._master = self._slave = -1
@@ -63,14 +63,14 @@ class PseudoTerminal:
 
     @property
     def device(self) -> str:
-        """Name of the device itself, empty without one."""
+        """Path of the device; empty without one."""
         return os.ttyname(self._slave) if self.plugged else ''
 
     def plug(self) -> None:
-        """Make the device, if there is none.
+        """Create the device if there is none.
 
         Raises:
-            SetupError: The link cannot be made.
+            SetupError: The link cannot be created.
         """
         if self.plugged:
             return
@@ -86,7 +86,7 @@ class PseudoTerminal:
             raise SetupError(f'{self.link} cannot be made: {error.strerror}') from error
 
     def unplug(self) -> None:
-        """Remove the device: programs that have it open see a hang-up."""
+        """Remove the device: programs that use it get a hang-up."""
         if not self.plugged:
             return
         device = self.device
@@ -97,23 +97,23 @@ class PseudoTerminal:
         self._master = self._slave = -1
 
     def fileno(self) -> int:
-        """Return what :mod:`select` waits for."""
+        """Return the file descriptor for :mod:`select`."""
         return self._master
 
     @property
     def baud(self) -> int:
-        """Speed that the program at the other end has chosen [bit/s]; 0 for one without a name."""
+        """Speed chosen by the other end [bit/s]; 0 for a non-standard one."""
         return _BAUD_OF.get(termios.tcgetattr(self._master)[_OUTPUT_SPEED], 0)
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, without waiting."""
+        """Return the received bytes without blocking."""
         try:
             return os.read(self._master, CHUNK)
         except BlockingIOError:
             return b''
 
     def write(self, data: bytes) -> None:
-        """Send bytes; those that the full buffer of the reader cannot hold are lost."""
+        """Send bytes; those that do not fit the reader's buffer are lost."""
         with suppress(BlockingIOError):
             os.write(self._master, data)
 
@@ -123,7 +123,7 @@ class PseudoTerminal:
         self._claim.close()
 
     def __enter__(self) -> Self:
-        """Use it in a with statement."""
+        """Return the terminal."""
         return self
 
     def __exit__(self, *_error: object) -> None:
@@ -132,7 +132,7 @@ class PseudoTerminal:
 
 
 def _claim(link: Path) -> socket.socket:
-    """Claim a path for this process, in a way that ends with it even when it is killed."""
+    """Lock a path for this process; the lock ends with the process, even if killed."""
     claim = socket.socket(socket.AF_UNIX)
     try:
         # a name that is no file: Linux gives it back by itself
@@ -146,7 +146,7 @@ def _claim(link: Path) -> socket.socket:
 
 
 def _is_left_over(link: Path) -> bool:
-    """Return whether a link is what a simulated robot that was killed has left behind."""
+    """Return whether a link was left behind by a killed simulated robot."""
     return link.is_symlink() and link.readlink().parent == DEVICES
 
 
@@ -158,7 +158,7 @@ TRUTH_PERIOD = 0.02  # [s] between two looks at where it is
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the robot really is."""
+    """Ground truth of the robot."""
 
     pose: BasePose  # of base_link in the world
     velocity: BaseVelocity  # of base_link
@@ -166,7 +166,7 @@ class Truth:
 
 
 class Server:
-    """Lets a robot live in real time; :meth:`run` is its loop, for a thread of its own."""
+    """Runs a robot in real time; run :meth:`run` in its own thread."""
 
     def __init__(
         self,
@@ -175,7 +175,7 @@ class Server:
         terminal: PseudoTerminal,
         watch: Callable[[], None] = lambda: None,
     ) -> None:
-        """Connect robot and terminal, which the caller closes; ``watch`` is called every 20 ms."""
+        """Connect robot and terminal; the caller closes it. ``watch`` is called every 20 ms."""
         self._plant, self._line, self._terminal = plant, line, terminal
         self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
         self._wake_read, self._wake_write = os.pipe()
@@ -186,10 +186,10 @@ class Server:
         self._look()
 
     def run(self) -> None:
-        """Serve until :meth:`stop`.
+        """Serve until :meth:`stop` is called.
 
         Raises:
-            SimulationError: The physics blew up, or the port could not be made again.
+            SimulationError: The simulation became unstable, or the port could not be recreated.
         """
         self._start = time.monotonic()
         while not self.stopping.is_set():
@@ -203,17 +203,17 @@ class Server:
                 os.read(self._wake_read, 64)
 
     def stop(self) -> None:
-        """End :meth:`run`; from any thread, also from a signal handler."""
+        """Stop :meth:`run`; callable from any thread or signal handler."""
         self.stopping.set()
         self._wake()
 
     def close(self) -> None:
-        """Release what :meth:`stop` and :meth:`submit` need; after the end of :meth:`run`."""
+        """Release the resources of :meth:`stop` and :meth:`submit`; call it after :meth:`run`."""
         os.close(self._wake_read)
         os.close(self._wake_write)
 
     def submit(self, action: Callable[[], Result]) -> Future[Result]:
-        """Run an action on the robot between two turns of the loop; thread-safe."""
+        """Run an action on the robot between two loop cycles; thread-safe."""
         future: Future[Result] = Future()
         self._actions.append((future, action))  # type: ignore[arg-type]
         self._wake()

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's servos as the board sees them: ids and degrees instead of joints and radians.
+"""The robot's servos as seen by the board: ids and degrees instead of joints and radians.
 
-A servo's angle is the joint's position in degrees, sign +1 and offset 0, unless it is mounted
-otherwise. The gripper's servo spreads the travel of the jaw over its whole range.
+A servo's angle is the joint's position in degrees, sign +1 and offset 0, unless mounted
+otherwise. The travel of the gripper's jaw maps to the whole range of its servo.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ MAX_SPEED = 255
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """How a servo sits on its joint."""
+    """Sign and offset of a servo on its joint."""
 
     sign: int = 1  # 1, or -1 for one that turns the other way
     offset: float = 0.0  # what the servo reads where the joint is at zero [deg]
 
     def __post_init__(self) -> None:
-        """Refuse what is no mounting.
+        """Reject an invalid mounting.
 
         Raises:
             SetupError: The message has the reason.
@@ -66,7 +66,7 @@ class Servos:
         model: Model,
         mounts: Mapping[int, Mount],
     ) -> None:
-        """Connect to a robot; mounts are those that a driver does not expect, by motor id.
+        """Connect to a robot; mounts override the driver's assumptions, by motor id.
 
         Raises:
             SetupError: A joint has no motor on this board, or a mounted servo no joint.
@@ -103,7 +103,7 @@ class Servos:
         self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
 
     def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:
-        """Send servos to angles [deg] in a time [s] or their own; what it lacks is left out."""
+        """Move servos to angles [deg] in a time [s], by default their own; skip missing servos."""
         positions = {
             self._joint[motor]: self._offset[motor] + self._gain[motor] * angle
             for motor, angle in angles.items()
@@ -112,7 +112,7 @@ class Servos:
         self._plant.set_targets(positions, duration)
 
     def command_one(self, motor: int, angle: float) -> None:
-        """Send one servo to an angle [deg], at the speed that is set for it."""
+        """Move one servo to an angle [deg] at its configured speed."""
         if motor not in self._joint:
             return
         speed = self._speed[motor]
@@ -124,20 +124,20 @@ class Servos:
         self.command({motor: angle}, abs(angle - now) / (NO_LOAD_SPEED * speed / MAX_SPEED))
 
     def set_speed(self, motors: Iterable[int], speed: int) -> None:
-        """Set how fast single commands are carried out, 1 to 255."""
+        """Set the speed of single commands, 1 to 255."""
         self._speed |= dict.fromkeys(motors, max(speed, 1))
 
     @property
     def at_full_speed(self) -> bool:
-        """Whether no servo was made slower."""
+        """Whether all servos run at full speed."""
         return min(self._speed.values()) >= MAX_SPEED
 
     def set_torque(self, motors: Iterable[int], on: bool, *, hold: bool = True) -> None:
-        """Switch servos on or off; those that the robot lacks or that have failed are left out.
+        """Switch servos on or off; skip missing and failed ones.
 
         Args:
-            hold: Those that wake hold where they are, as after switching on; else they go to their
-                last target, as when a host gives the torque back.
+            hold: Servos that switch on hold their position, as after power-up; else they go to
+                their last target, as when a host restores the torque.
         """
         names = [
             self._joint[motor]
@@ -147,7 +147,7 @@ class Servos:
         self._plant.set_torque(on, names, hold=hold)
 
     def fail(self, motor: int | None) -> None:
-        """Make a servo fail: it lets go. The one that had failed works, and holds where it is."""
+        """Make a servo fail and release; the one that failed before works again and holds."""
         if motor == self.failed:
             return
         repaired, self.failed = self.failed, motor
@@ -157,19 +157,19 @@ class Servos:
             self.set_torque([motor], False)
 
     def torque_on(self, motor: int) -> bool:
-        """Return whether a servo holds."""
+        """Return whether a servo has torque."""
         return self._plant.torque_on(self._joint[motor])
 
     def angles(self, measured: Measurement) -> tuple[float, ...]:
-        """Return angles by slot [deg]; 0 for servos that the robot lacks."""
+        """Return angles by slot [deg]; 0 for missing servos."""
         return self.by_slot((measured.positions - self._offsets) / self._gains)
 
     def speeds(self, measured: Measurement) -> tuple[float, ...]:
-        """Return velocities by slot [deg/s]; 0 for servos that the robot lacks."""
+        """Return velocities by slot [deg/s]; 0 for missing servos."""
         return self.by_slot(measured.velocities / self._gains)
 
     def by_slot(self, values: Array) -> tuple[float, ...]:
-        """Return values of the joints by slot."""
+        """Reorder joint values by slot."""
         slots = np.zeros(len(MOTOR_ORDER))
         slots[self._slots] = values
         return tuple(slots.tolist())

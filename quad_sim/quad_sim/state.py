@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The state of a simulated robot as values, what noisy sensors measure of it, and its ground.
+"""State of a simulated robot, sensor noise, and terrain.
 
 Frames are as in REP 103, quaternions are (x, y, z, w).
 """
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BasePose:
-    """Where base_link is."""
+    """Pose of base_link."""
 
     position: Vector  # of base_link in the world [m]
     orientation: Quaternion  # of base_link in the world, (x, y, z, w)
@@ -40,7 +40,7 @@ class BasePose:
 
 @dataclass(frozen=True, slots=True)
 class BaseVelocity:
-    """How base_link moves."""
+    """Velocity of base_link."""
 
     linear: Vector  # velocity of base_link's origin, in base_link [m/s]
     angular: Vector  # angular velocity, in base_link [rad/s]
@@ -48,7 +48,7 @@ class BaseVelocity:
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """What an ideal IMU in imu_link feels."""
+    """Values of an ideal IMU at imu_link."""
 
     specific_force: Vector  # [m/s2]; +g up at rest; behind the low-pass of the chip
     angular_velocity: Vector  # [rad/s]
@@ -57,7 +57,7 @@ class Imu:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """What the board has measured, noise and encoder steps included."""
+    """Values measured by the board, including noise and encoder resolution."""
 
     imu: Imu  # what the IMU measures
     positions: Array  # of the joints [rad], of the gripper [m]; in the order of the URDF
@@ -95,7 +95,7 @@ BOARD = Noise(
 
 
 def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Measurement:
-    """Return what noisy sensors measure of a true state."""
+    """Add sensor noise to a true state."""
     if noise == NONE:
         return truth
     count = len(truth.positions)
@@ -125,7 +125,7 @@ MAX_ROUGHNESS = 0.1  # [m] higher than the hips of the robot
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """A plane, level or tilted, with bumps on it or without."""
+    """A plane, level or tilted, optionally with bumps."""
 
     angle: float = 0.0  # how steep it is [rad]
     direction: float = 0.0  # where it rises to, from the world's x axis counter-clockwise [rad]
@@ -136,7 +136,7 @@ class Terrain:
     seed: int = 0  # of the bumps
 
     def __post_init__(self) -> None:
-        """Refuse ground that nothing stands on."""
+        """Reject invalid ground."""
         if not abs(self.angle) <= MAX_SLOPE:
             raise SetupError(
                 f'slope of {self.angle} rad: give -{MAX_SLOPE:.2f} to {MAX_SLOPE:.2f}'
@@ -150,12 +150,12 @@ class Terrain:
 
     @classmethod
     def slope(cls, angle: float, direction: float = 0.0) -> Terrain:
-        """Return ground that rises with an angle [rad] in a direction [rad]."""
+        """Create a slope that rises by an angle [rad] in a direction [rad]."""
         return cls(angle, direction)
 
     @property
     def normal(self) -> Vector:
-        """Unit vector out of the ground, in the world."""
+        """Upward unit normal of the ground, in the world."""
         return (
             -math.sin(self.angle) * math.cos(self.direction),
             -math.sin(self.angle) * math.sin(self.direction),
@@ -164,9 +164,10 @@ class Terrain:
 
     @property
     def orientation(self) -> Quaternion:
-        """Rotation of a robot that stands on it and faces along the world's x axis.
+        """Rotation of a robot that stands on the ground and faces along the world's x axis.
 
-        It turns by the slope about the horizontal axis across the direction of the slope.
+        It rotates by the slope angle about the horizontal axis perpendicular to the slope
+        direction.
         """
         across = math.sin(self.direction), -math.cos(self.direction), 0.0
         return about(across, self.angle)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that quad_teleop raises.
+"""Exceptions of quad_teleop.
 
 ::
 
     TeleopError
-    ├── SettingError (ValueError)   a parameter is misspelt, or its value makes no sense
+    ├── SettingError (ValueError)   a parameter is misspelt, or its value is invalid
     └── CommandError (ValueError)   a velocity is not finite
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
@@ -19,8 +19,8 @@ class TeleopError(Exception):
 
 
 class SettingError(TeleopError, ValueError):
-    """Such as a priority above 255, two sources on one topic, a speed above its limit."""
+    """Invalid settings: a priority above 255, two sources on one topic, an excessive speed."""
 
 
 class CommandError(TeleopError, ValueError):
-    """Such as NaN from a planner that divided by zero."""
+    """A velocity is not finite, such as NaN from a planner's division by zero."""

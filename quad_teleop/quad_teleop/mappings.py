@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What keys and the controls of a gamepad mean to a walking robot. Pure; times are in [s].
+"""Key and gamepad mappings for a walking robot. No ROS; times are in [s].
 
-The map of the keys is that of teleop_twist_keyboard, and what a walking robot has besides: ``t``
-and ``b``, up and down there, are the height of the body here. Roll, yaw and height by letters are
-those of champ_teleop.
+The keys are those of teleop_twist_keyboard, with additions for a walking robot: ``t`` and ``b``,
+up and down there, change the body height here. The letters for roll, yaw and height are those of
+champ_teleop.
 """
 
 from __future__ import annotations
@@ -132,20 +132,20 @@ REQUESTS: dict[str, Request] = {
 
 
 class WatchedRobot(Robot, Protocol):
-    """The robot as the status line needs it."""
+    """Interface to the robot for the status line."""
 
     mode: Mode | None  # the mode that was granted last; None before
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether the velocities have subscribers."""
+        """Whether the velocity topic has subscribers."""
 
     def report(self, now: float) -> ControllerReport | None:
-        """Return what the controller reported last; None when that is long ago."""
+        """Return the last controller report; None if it is outdated."""
 
 
 class KeyboardTeleop(KeyMapping):
-    """Moves while a key of the map is held, and stops when it is not."""
+    """Moves while a mapped key is held, and stops when it is released."""
 
     introduction = HELP
     robot: WatchedRobot
@@ -165,12 +165,12 @@ class KeyboardTeleop(KeyMapping):
         self._hint = ''
 
     def wanted(self, now: float) -> Velocity | None:
-        """Return the velocity that is wanted; None when no key requests one."""
+        """Return the requested velocity; None if no key requests one."""
         key = self._held.current(now)
         return None if key is None else MOVES[key].at(self.speeds)
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Apply an event; return what the person requests besides a velocity."""
+        """Process an event; return the user's requests other than velocities."""
         key = event.key
         if key in MOVES or not event.is_stroke:
             self._held.feed(event)
@@ -183,7 +183,7 @@ class KeyboardTeleop(KeyMapping):
         return [] if event.action is KeyAction.REPEATED else self._stroke(key)
 
     def status(self, now: float) -> list[StatusPart]:
-        """Return what the status line shows; report what keeps the robot from moving."""
+        """Return the status line; include what keeps the robot from moving."""
         robot, velocity = self.robot, self.wanted(now)
         report, has_subscriber = robot.report(now), robot.has_subscriber
         text = hint(robot.mode, report, velocity, has_subscriber=has_subscriber)
@@ -241,14 +241,14 @@ class GamepadTeleop(DeadmanMapping):
         steps: PoseSteps,
         warn: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Start idle, with the speeds at the end of a stick's way, and the steps of the d-pad."""
+        """Start idle, with the speeds at full stick deflection and the d-pad steps."""
         super().__init__(robot, deadman, stream, warn)
         self.pose = NEUTRAL  # the pose of the body that was requested last
         self._speeds = {Grip.HELD: normal, Grip.TURBO: turbo}
         self._steps = steps
 
     def wanted(self, now: float) -> Velocity | None:
-        """Return the velocity that is wanted; None without the deadman.
+        """Return the requested velocity; None without the deadman.
 
         Without a deadman button, a gamepad at rest requests nothing.
         """
@@ -260,10 +260,10 @@ class GamepadTeleop(DeadmanMapping):
         return None if velocity == ZERO and self._deadman.enable is None else velocity
 
     def feed(self, state: GamepadState) -> list[Mode | BodyPose | RobotRequest]:
-        """Apply a state of the gamepad; return what the person requests besides a velocity.
+        """Process a gamepad state; return the user's requests other than velocities.
 
-        Whatever makes the robot move needs the deadman, as walking does; lying down and clearing a
-        fault, which moves nothing, need none.
+        All requests that move the robot need the deadman, except lying down. Clearing a fault
+        moves nothing and does not need it.
         """
         before = self.take(state)
         allowed = self.grip is not Grip.RELEASED
@@ -285,7 +285,7 @@ class GamepadTeleop(DeadmanMapping):
 
 
 def _tilt(before: GamepadState, state: GamepadState) -> BodyPose:
-    """Return the steps of the sides of the d-pad that went down."""
+    """Return the steps for newly pressed d-pad directions."""
 
     def pressed(axis: Axis) -> float:
         return state.axis(axis) if state.axis(axis) != before.axis(axis) else 0.0

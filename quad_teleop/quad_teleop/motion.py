@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person requests of the robot, and what a person at a keyboard reads of it.
+"""Requests of a user to the robot, and the text that shows its state on a terminal.
 
 Lengths are in [m], angles in [rad], velocities in [m/s] and [rad/s], in base_link (REP 103).
 """
@@ -23,7 +23,7 @@ MIN_SPEED = 0.01  # [m/s] and [rad/s]: slower is standing, and could not be made
 
 
 class Mode(Enum):
-    """A mode of ``set_mode``, by its name there, that one key or button requests."""
+    """A mode of ``set_mode`` that a key or button requests; the value is its name."""
 
     LIE = 'lie'
     STAND = 'stand'
@@ -33,12 +33,12 @@ class Mode(Enum):
 
     @property
     def moves(self) -> bool:
-        """Whether velocity commands do anything in it."""
+        """Whether the robot follows velocity commands in this mode."""
         return self in {Mode.WALK, Mode.TURN}
 
 
 class RobotRequest(Enum):
-    """What a person can request of the robot besides velocities, poses and modes."""
+    """User requests other than velocities, poses and modes."""
 
     STOP = auto()
     """Stop the whole robot: gait or policy end, whatever follows the velocity."""
@@ -56,7 +56,7 @@ class Velocity:
     yaw: float = 0.0
 
     def at(self, speeds: Speeds) -> Velocity:
-        """Return the velocity this way, where these are factors of the two speeds, -1 to 1."""
+        """Scale this direction by the two speeds; its components are -1 to 1."""
         return Velocity(self.x * speeds.linear, self.y * speeds.linear, self.yaw * speeds.angular)
 
 
@@ -71,10 +71,10 @@ def rest_of(_: Velocity | None) -> Velocity:
 
 @dataclass(frozen=True, slots=True)
 class Speeds:
-    """Speed of walking and of turning, within limits.
+    """Walking and turning speeds, within limits.
 
     Raises:
-        SettingError: A speed is above its limit, or too slow to be one.
+        SettingError: A speed is above its limit or too low.
     """
 
     linear: float = 0.15
@@ -94,7 +94,7 @@ class Speeds:
                 )
 
     def scaled(self, linear: int, angular: int) -> Speeds:
-        """Return other speeds by steps of 10 %, negative for slower; the limits are kept."""
+        """Change the speeds by steps of 10 %, negative to slow down, within the limits."""
         return replace(
             self,
             linear=_scaled(self.linear, linear, self.linear_limit),
@@ -104,9 +104,9 @@ class Speeds:
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """Offset of the body from how it stands by itself: upwards, right side down, nose down, left.
+    """Offset from the normal body pose: up, right side down, nose down, turned left.
 
-    Roll, pitch, yaw about fixed axes, as in REP 103.
+    Roll, pitch and yaw are about fixed axes (REP 103).
     """
 
     height: float = 0.0
@@ -125,7 +125,7 @@ NEUTRAL = BodyPose()
 
 @dataclass(frozen=True, slots=True)
 class PoseSteps:
-    """By how much a stroke changes the pose, and how far it may go to either side.
+    """Pose change per keystroke, and the limit to either side.
 
     Raises:
         SettingError: A step is not positive, or above its limit.
@@ -147,11 +147,11 @@ class PoseSteps:
                 )
 
     def moved(self, pose: BodyPose, direction: BodyPose) -> BodyPose:
-        """Return the pose one stroke further; at a limit it stays there.
+        """Return the pose after one keystroke, clamped to the limits.
 
         Args:
             pose: Present pose.
-            direction: Steps of each part, 1 or -1 for those that change.
+            direction: Step of each component, 1 or -1 for those that change.
         """
 
         def angle(value: float, steps: float) -> float:
@@ -185,7 +185,7 @@ FOLLOWS_VELOCITIES = frozenset({'walk', 'turn', 'policy'})
 
 @dataclass(frozen=True, slots=True)
 class ControllerReport:
-    """One report."""
+    """A status report of the controller."""
 
     state: str  # what the robot does: ``walk``, ``to stand``, ``fault``
     goal: str  # the mode that it is on its way to
@@ -201,7 +201,7 @@ class ControllerReport:
 def read_report(
     name: str, level: int, message: str, values: Mapping[str, str], now: float
 ) -> ControllerReport | None:
-    """Read a status of /diagnostics, come at a time [s]; None if it is not the controller's."""
+    """Parse a /diagnostics status received at a time [s]; None if not the controller's."""
     if not name.endswith(NAME) or 'state' not in values:
         return None
     state = values['state']
@@ -209,7 +209,7 @@ def read_report(
 
 
 def state_part(mode: Mode | None, report: ControllerReport | None) -> StatusPart:
-    """Show what the controller reports, else the mode that it granted last."""
+    """Format the reported controller state, or else the mode granted last."""
     if report is not None:
         return report.state, Style.RED if report.has_fault else Style.BOLD
     return mode.value if mode else 'mode ?', Style.BOLD
@@ -218,7 +218,7 @@ def state_part(mode: Mode | None, report: ControllerReport | None) -> StatusPart
 def motion_parts(
     speeds: Speeds, velocity: Velocity | None, pose: BodyPose, *, has_subscriber: bool
 ) -> list[StatusPart]:
-    """Show the speeds that are set, the velocity that is wanted, and how the body shall stand."""
+    """Format the speed settings, the requested velocity and the body pose."""
     parts = [(f'{speeds.linear:.2f} m/s {speeds.angular:.2f} rad/s', Style.BOLD)]
     if velocity is None:
         parts.append((f'{"idle":<27}', Style.DIM))
@@ -240,7 +240,7 @@ def hint(
     *,
     has_subscriber: bool,
 ) -> str:
-    """Return why the robot may not move although it is commanded to; empty for no reason."""
+    """Return why the robot may not follow commands; empty if there is no reason."""
     if report is not None and report.has_fault:
         return f'fault: {report.message}; Backspace clears it, 0 lies down, 9 gets up'
     if velocity is None or not has_subscriber:

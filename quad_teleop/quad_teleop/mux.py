@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which of several sources of velocities is active. Pure; times are handed in, in [s].
+"""Selects the active one of several velocity sources. No ROS or clock; times are in [s].
 
-As in twist_mux: of the sources that are not stale and not below a lock, the one of the highest
-priority is forwarded; of equal ones the first by name. A lock is closed while its last message
-was true, and when it is stale. Other than there: when the source that is active falls silent or is
-locked, the robot is commanded to stop, and does not wait for its own time-out; and a source
-that never published does not block others, even with a time-out of 0.
+As in twist_mux, it forwards the source with the highest priority that is neither stale nor below a
+lock; among equal ones, the first by name. A lock is closed while its last message was true, and
+when it is stale. Unlike twist_mux, it commands a stop when the active source falls silent or is
+locked, without waiting for the robot's own time-out; and a source that never published does not
+block others, even with a time-out of 0.
 
 Parameters are named as in twist_mux 4: ``topics.<name>.{topic, timeout, priority}`` and
 ``locks.<name>.{topic, timeout, priority}``.
@@ -24,7 +24,7 @@ NEVER = -math.inf
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A topic with velocities, or one with a lock."""
+    """A velocity topic or a lock topic."""
 
     name: str  # name among the parameters
     topic: str  # name of the topic
@@ -32,13 +32,13 @@ class Input:
     priority: int  # 0 to 255; of those that publish, the highest is active
 
     def is_stale(self, received: float, now: float) -> bool:
-        """Return whether it has been silent for too long since it was received last."""
+        """Return whether the time-out since the last message has expired."""
         return self.timeout > 0.0 and now - received > self.timeout
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """All that the multiplexer subscribes: velocities and locks, in the order of their names."""
+    """All subscriptions of the multiplexer: velocities and locks, ordered by name."""
 
     sources: tuple[Input, ...]
     locks: tuple[Input, ...]
@@ -59,17 +59,17 @@ DEFAULTS = Inputs(
 
 
 class Multiplexer:
-    """Decides for each message whether it is forwarded, and when to send a zero."""
+    """Decides which messages to forward, and when to send a zero velocity."""
 
     def __init__(self, inputs: Inputs) -> None:
-        """Start without a message; locks that have a time-out are closed."""
+        """Start without messages; locks with a time-out are closed."""
         self.inputs = inputs
         self._received: dict[str, float] = {}  # when a source published last
         self._locks = {each.name: (NEVER, False) for each in inputs.locks}  # when, and what
         self._forwarded: str | None = None  # the source whose motion was forwarded last
 
     def lock_priority(self, now: float) -> int:
-        """Return the priority below which sources are locked; 0 when nothing is locked."""
+        """Return the priority below which sources are locked; 0 if none is."""
         return max(
             (lock.priority for lock in self.inputs.locks if self.is_locked(lock, now)), default=0
         )
@@ -80,21 +80,21 @@ class Multiplexer:
         return locked or lock.is_stale(received, now)
 
     def is_masked(self, source: Input, now: float) -> bool:
-        """Return whether a source is not active: stale, or locked."""
+        """Return whether a source is stale or locked."""
         received = self._received.get(source.name)
         silent = received is None or source.is_stale(received, now)
         return silent or source.priority < self.lock_priority(now)
 
     def active(self, now: float) -> Input | None:
-        """Return the source that is active; None when there is none."""
+        """Return the active source; None if there is none."""
         active = [each for each in self.inputs.sources if not self.is_masked(each, now)]
         return max(active, key=lambda each: each.priority, default=None)
 
     def velocity(self, name: str, parts: tuple[float, ...], now: float) -> bool:
-        """Store a velocity of a source, linear and angular; return whether to forward it.
+        """Store a source's velocity, linear and angular; return whether to forward it.
 
         Raises:
-            CommandError: One of its numbers is none; the message does not count as received.
+            CommandError: A number is not finite; the message is ignored.
         """
         if not all(math.isfinite(part) for part in parts):
             raise CommandError(f'{name} sends {parts}, which is not finite; it is not forwarded')
@@ -110,7 +110,7 @@ class Multiplexer:
         self._locks[name] = now, locked
 
     def zero_due(self, now: float) -> bool:
-        """Return whether to send a zero now: the robot moves, and no source is active any more."""
+        """Return whether to send a zero now: the robot moves without an active source."""
         if self._forwarded is None or self.active(now) is not None:
             return False
         self._forwarded = None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first motion of each joint: small, while a key is held, then judged by what was seen."""
+"""First motion of each joint: small, while a key is held, then checked by observation."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ def check_joint(
     keyboard: Callable[[], AbstractContextManager[Keyboard]],
     servo: JointServo,
 ) -> None:
-    """Move a joint while the space bar of an opened keyboard is held, and ask what was seen.
+    """Move a joint while the space bar is held, and ask what the user observed.
 
     Raises:
-        CancelledError: The person has ended it.
-        CommandError: It moved otherwise than its servo says; the message has the remedy.
+        CancelledError: The user cancelled.
+        CommandError: The joint did not move as expected; the message has the remedy.
         NoAnswerError: The robot does not report, or commands are not sent.
     """
     angles = robot.angles()
@@ -118,7 +118,7 @@ def _move(
     guard: MotionGuard,
     angles: Mapping[int, float],
 ) -> None:
-    """Move as long as the guard permits; then the servo holds where it is."""
+    """Move as long as the guard permits; then hold."""
     held, target, plan = HeldKeys(), guard.plan.start, guard.plan
     last = seen_at = robot.now()
     latest, order = dict(angles), Order.NONE

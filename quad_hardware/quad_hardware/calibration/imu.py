@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the IMU is mounted, from how a person tilts the robot: compared with gravity.
+"""Determines the IMU mounting from gravity while the user tilts the robot.
 
-The signs of a gyro follow from the way between the stances: it has to turn with the attitude.
+The gyro signs follow from the motion between the stances: it has to agree with the attitude.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ GRAVITY_TOLERANCE = 2.0  # [m/s²] of an accelerometer at rest
 
 
 class Stance(Enum):
-    """How the robot is held; the value is what the person has to do."""
+    """Pose in which to hold the robot; the value is the instruction to the user."""
 
     LEVEL = 'put the robot level, on its feet or its belly'
     NOSE_DOWN = 'lift its tail, so that the nose points down by about 20 degrees, and hold it'
@@ -72,10 +72,10 @@ _ROTATIONS = tuple(
 
 
 def calibrate_imu(console: Console, robot: LimpRobot) -> ImuMounting:
-    """Guide a person who tilts the robot; return how the IMU is mounted.
+    """Guide the user in tilting the robot; return the IMU mounting.
 
     Raises:
-        CommandError: What was reported fits no mounting; the message names the stance.
+        CommandError: No mounting fits the reports; the message names the stance.
     """
     readings = {}
     for stance in Stance:
@@ -85,10 +85,10 @@ def calibrate_imu(console: Console, robot: LimpRobot) -> ImuMounting:
 
 
 def find_mounting(readings: Readings) -> ImuMounting:
-    """Return the mounting that fits how the robot was held, with as few signs as can be.
+    """Return the mounting that fits all stances with the fewest sign changes.
 
     Raises:
-        CommandError: None fits; the message names what does not.
+        CommandError: No mounting fits; the message names the misfit.
     """
     _check_gravity(readings)
     fitting = [mounting for mounting in _candidates() if not _misfit(mounting, readings)]
@@ -101,9 +101,9 @@ def find_mounting(readings: Readings) -> ImuMounting:
 
 
 def with_gyro(mounting: ImuMounting, readings: Readings) -> ImuMounting:
-    """Return a mounting with the signs of the gyro, by how the robot was turned between stances.
+    """Add gyro signs to a mounting, from the rotations between stances.
 
-    Where no gyro is reported, it stays as it is.
+    Without gyro reports, the mounting is unchanged.
 
     Raises:
         CommandError: The gyro does not turn with the attitude; the message names the axis.
@@ -117,7 +117,7 @@ def with_gyro(mounting: ImuMounting, readings: Readings) -> ImuMounting:
 
 
 def _turns(mounting: ImuMounting, states: Sequence[Report]) -> Iterator[tuple[Vector, Vector]]:
-    """Return how far gyro and attitude turned in windows of time, about the IMU's axes [rad]."""
+    """Return the rotations of gyro and attitude in time windows, about the IMU's axes [rad]."""
     for begin in range(0, len(states) - TURN_WINDOW, TURN_WINDOW):
         window = states[begin : begin + TURN_WINDOW + 1]
         steps = [(b.arrival - a.arrival, b.rates) for a, b in itertools.pairwise(window)]
@@ -133,7 +133,7 @@ def _turns(mounting: ImuMounting, states: Sequence[Report]) -> Iterator[tuple[Ve
 
 
 def _gyro_sign(axis: str, turns: Iterable[tuple[float, float]]) -> float:
-    """Return the sign of the gyro about an axis, by its turns and those of the attitude [rad]."""
+    """Return the gyro's sign about an axis, from rotations of gyro and attitude [rad]."""
     pairs = list(turns)
     turned = sum(attitude**2 for _, attitude in pairs)
     if turned < MIN_TURNED**2:
@@ -157,7 +157,7 @@ def _candidates() -> Iterator[ImuMounting]:
 
 
 def _flips(mounting: ImuMounting) -> tuple[int, float]:
-    """Order mountings: a rotation is likelier than signs, and none likelier than one."""
+    """Rank mountings: no change before a rotation, a rotation before signs."""
     signs = (*mounting.attitude_signs, *mounting.acceleration_signs)
     return signs.count(-1.0), -abs(mounting.rotation[3])
 
@@ -175,7 +175,7 @@ def _check_gravity(readings: Readings) -> None:
 
 
 def _misfit(mounting: ImuMounting, readings: Readings) -> str:
-    """Return what of the readings does not fit a mounting; nothing when all do."""
+    """Return why the readings do not fit a mounting; empty if they do."""
     by_attitude = {
         stance: rotate(conjugate(mounting.attitude(reading.attitude)), (0.0, 0.0, 1.0))
         for stance, reading in readings.items()
@@ -204,7 +204,7 @@ def _misfit(mounting: ImuMounting, readings: Readings) -> str:
 
 
 def _wrong_tilt(up: Mapping[Stance, Vector]) -> str:
-    """Return which stance is not as it was requested, by the direction of up in the body."""
+    """Return the stance that was held wrongly, by the direction of up in the body."""
     level = up[Stance.LEVEL]
     if (tilt := angle_between(level, (0.0, 0.0, 1.0))) > MAX_LEVEL_TILT:
         return f'level: tilted by {math.degrees(tilt):.0f} degrees'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware calibrate``: joints, IMU or odometry into a parameter file; servos."""
+"""``ros2 run quad_hardware calibrate``: calibrates joints, IMU, odometry; identifies servos."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ Tree = dict[str, object]
 
 
 def read_parameters(path: Path) -> Tree:
-    """Return the parameters of hardware_node in a file; none where there is no file.
+    """Read hardware_node's parameters from a file; empty if the file does not exist.
 
     Raises:
-        CommandError: It is no parameter file.
+        CommandError: The file is not a parameter file.
     """
     if not path.exists():
         return {}
@@ -51,14 +51,14 @@ def read_parameters(path: Path) -> Tree:
 
 
 def write_parameters(path: Path, changes: Mapping[str, object]) -> None:
-    """Write parameters into a file, beside those that it has.
+    """Merge parameters into a file.
 
     Args:
-        path: The file; it is replaced as a whole, or not at all.
-        changes: By name; a mapping changes what it names only.
+        path: The file; it is replaced atomically.
+        changes: Values by name; a mapping changes only its own keys.
 
     Raises:
-        CommandError: The file that is there is no parameter file.
+        CommandError: The existing file is not a parameter file.
     """
     tree = _merged(read_parameters(path), changes)
     text = yaml.safe_dump({NODE: {PARAMETERS: tree}}, sort_keys=False)
@@ -68,7 +68,7 @@ def write_parameters(path: Path, changes: Mapping[str, object]) -> None:
 
 
 def servo_parameters(servos: Iterable[JointServo]) -> Tree:
-    """Return what was measured of servos, by joint as hardware_node reads it."""
+    """Return measured servo data as parameters of hardware_node, by joint."""
     joints: dict[str, Tree] = {}
     for servo in servos:
         numbers = {'offset': servo.offset, 'lower': servo.lower, 'upper': servo.upper}
@@ -78,7 +78,7 @@ def servo_parameters(servos: Iterable[JointServo]) -> Tree:
 
 
 def imu_parameters(mounting: ImuMounting) -> Tree:
-    """Return how the IMU sits in the body, as hardware_node reads it; signs where checked."""
+    """Return the IMU mounting as parameters of hardware_node, with signs if checked."""
     gyro: Tree = (
         {'rate_signs': list(mounting.rate_signs), 'rates_checked': True}
         if mounting.rates_checked
@@ -172,7 +172,7 @@ def _servos(options: argparse.Namespace, console: Console) -> None:
 
 
 def _calibrated(urdf: str, known: Mapping[str, object]) -> list[JointServo]:
-    """Return the servos of all joints, by the parameters that are known of them."""
+    """Return the servos of all joints, with the known parameters applied."""
     joints = cast('Mapping[str, Mapping[str, Any]]', known.get('joints', {}))
     return [
         replace(servo_of(joint), **joints.get(joint.name, {})) for joint in movable_joints(urdf)
@@ -211,7 +211,7 @@ _PARTS = {
 
 
 def run_calibrate(argv: Sequence[str], console: Console) -> int:
-    """Calibrate as the command line says; return the exit code."""
+    """Run the calibration that the command line requests; return the exit code."""
     options = _parser().parse_args(argv)
     try:
         _PARTS[options.what](options, console)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scale of the odometry: the robot walks, and someone measures how far it really came."""
+"""Odometry scale: the robot walks, and the user measures the real distance."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ Place = tuple[float, float, float]
 
 
 def way(start: Place, end: Place, axis: str) -> float:
-    """Return how far a place is along an axis, x or y, of another one [m]."""
+    """Return the distance between two positions along an axis, x or y [m]."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     cosine, sine = math.cos(start[2]), math.sin(start[2])
     return cosine * dx + sine * dy if axis == 'x' else cosine * dy - sine * dx
 
 
 class Walker(GraphClient):
-    """A robot that can be sent somewhere, over ROS, along an axis of its own: x or y."""
+    """Drives a robot over ROS along one of its axes: x or y."""
 
     def __init__(self, axis: str) -> None:
         super().__init__('quad_calibrate', lambda: False)
@@ -48,10 +48,10 @@ class Walker(GraphClient):
         self.node.create_subscription(Odometry, 'odom', self._take, 10)
 
     def place(self) -> Place:
-        """Return where odometry has the robot now.
+        """Return the present position from odometry.
 
         Raises:
-            NoAnswerError: There is no publisher of /odom.
+            NoAnswerError: Nothing publishes /odom.
         """
         self._places.clear()
         try:
@@ -61,10 +61,10 @@ class Walker(GraphClient):
         return self._places[-1]
 
     def scale(self) -> float:
-        """Return by what hardware_node multiplies the way along the axis now.
+        """Return hardware_node's present odometry scale along the axis.
 
         Raises:
-            NoAnswerError: It does not answer.
+            NoAnswerError: hardware_node does not answer.
         """
         client = self.node.create_client(GetParameters, 'hardware_node/get_parameters')
         request = GetParameters.Request(names=[f'odometry.scale_{self._axis}'])
@@ -77,7 +77,7 @@ class Walker(GraphClient):
         return float(future.result().values[0].double_value)
 
     def walk(self, distance: float, speed: float) -> float:
-        """Drive the robot until odometry has a distance; return the distance at the end [m].
+        """Drive until odometry shows a distance; return the final distance [m].
 
         Raises:
             NoAnswerError: The robot does not walk, or /odom fell silent.
@@ -109,7 +109,7 @@ class Walker(GraphClient):
 
 
 def calibrate_odometry(console: Console, axis: str, distance: float, speed: float) -> float:
-    """Drive the robot, ask how far it came, and return the scale that its odometry should have.
+    """Drive the robot, prompt for the real distance, and return the corrected scale.
 
     Raises:
         NoAnswerError: The robot does not walk.

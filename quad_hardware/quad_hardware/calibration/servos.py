@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""The servo model of a robot: one thigh of a robot that hangs free steps and swings.
+r"""Identifies the servo model: one thigh of a suspended robot does steps and swings.
 
 The model is that of quad_sim: a leg that hangs free turns about one joint by
 
@@ -8,9 +8,9 @@ The model is that of quad_sim: a leg that hangs free turns about one joint by
           - d \dot q + \tau_g(q)
 
 The largest torque, the inertia of the links and their weight come from the URDF, so the stiffness
-has a unit. The parameters minimize the error of the positions (Levenberg-Marquardt), of which
-those far off, as after a command that left late, hardly count (the cost is Cauchy's); standard
-deviations follow from the Jacobian and show whether the recording determines them.
+has a unit. The parameters minimize the position error (Levenberg-Marquardt); a
+Cauchy loss gives outliers, as after a late command, little weight. Standard deviations follow from
+the Jacobian and show whether the recording determines the parameters.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Series = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One joint while it was commanded."""
+    """Recorded motion of one commanded joint."""
 
     targets: Series  # when each was on the line [s], and what it was [rad]
     positions: Series  # when each was measured [s], and what it was [rad]
@@ -64,7 +64,7 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What a servo turns."""
+    """Mechanical load of a servo."""
 
     inertia: float  # of the links about the axis [kg m²]
     level: float  # torque of gravity with the joint at zero [N m]
@@ -74,7 +74,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class ServoFit:
-    """What a servo does with its target, in the terms of quad_sim."""
+    """Identified servo parameters, as in quad_sim."""
 
     stiffness: float  # [N m/rad]
     velocity_gain: float  # torque against speed inside the clamp [N m s/rad]
@@ -87,7 +87,7 @@ class ServoFit:
 
     @property
     def argument(self) -> str:
-        """What ``fake_xgo --servo`` takes; its free width is the dead band and half the play."""
+        """Value for ``fake_xgo --servo``; its free width is dead band plus half the play."""
         deadband = min(ENCODER_STEP, self.free_width)
         values = {
             'kp': self.stiffness,
@@ -105,7 +105,7 @@ class ServoFit:
 def leg_load(
     tree: KinematicTree, joint: str, positions: Mapping[str, float], max_torque: float
 ) -> Load:
-    """Return what a joint turns while the others stand at positions [rad], the trunk level."""
+    """Return the load of a joint, with the others at given positions [rad] and a level trunk."""
     (hinge,) = (each for each in tree.joints if each.name == joint)
     masses = tuple(tree.masses())
 
@@ -130,10 +130,10 @@ _START = (3.0, 0.05, 0.05, 0.01, 0.03, 0.001, 0.0)
 
 
 def fit_servo(recording: Recording, load: Load) -> ServoFit:
-    """Return the servo that a recording shows.
+    """Identify the servo from a recording.
 
     Raises:
-        CommandError: The recording does not show one; the message has the reason and the remedy.
+        CommandError: Identification fails; the message has the reason and the remedy.
     """
     _check(recording)
     model = _Model(recording, load)
@@ -178,7 +178,7 @@ def _check(recording: Recording) -> None:
 
 
 class _Model:
-    """The positions that parameters predict for a recording."""
+    """Predicts the positions of a recording from servo parameters."""
 
     def __init__(self, recording: Recording, load: Load) -> None:
         times, places = map(np.array, zip(*recording.positions, strict=True))
@@ -188,7 +188,7 @@ class _Model:
         self._ramp = _set_points(recording.targets, INTERPOLATION)
 
     def solve(self) -> tuple[list[float], float, dict[str, float]]:
-        """Return parameters, the error that is left [rad] rms, and standard deviations."""
+        """Return parameters, residual [rad] rms, and standard deviations."""
         place = np.array(_START)
         count = len(place)
         scale = np.array([1.0, 0.02, 0.02, 0.005, 0.01, 0.0005, 0.01])
@@ -232,7 +232,7 @@ class _Model:
         )
 
     def predict(self, parameters: Array) -> Array:
-        """Return positions at the samples, one column for each column of parameters."""
+        """Return the positions at the samples, one column per parameter column."""
         stiffness, gain, damping, free, delay, armature, zero = parameters
         load, times = self._load, self._times
         places, knots = self._ramp
@@ -259,13 +259,13 @@ class _Model:
 
 
 def _cost(residuals: Array) -> Array:
-    """Return the cost of each column: that of Cauchy, to which a late moment hardly counts."""
+    """Return the Cauchy loss of each column, in which outliers have little weight."""
     cost: Array = np.log1p((residuals / _OUTLIER) ** 2).sum(axis=0)
     return cost
 
 
 def _set_points(targets: Series, interpolation: float) -> tuple[Array, Array]:
-    """Return times and set-points of a servo without delay, linear in between."""
+    """Return times and set-points of a servo without delay, piecewise linear."""
     times, values = [targets[0][0] - 1.0], [targets[0][1]]
     now, goal, arrival = targets[0][1], targets[0][1], -math.inf
     for time, target in targets:
@@ -303,15 +303,15 @@ def calibrate_servos(
     *,
     repeat: int = 1,
 ) -> ServoFit:
-    """Swing the thigh of a leg, fit the servo model, and print it as the other packages take it.
+    """Swing the thigh of a leg, fit the servo model, and print it for the other packages.
 
     Args:
-        servos: Of all joints.
-        leg: Its name, such as fl.
-        repeat: How often the motion is done.
+        servos: Servos of all joints.
+        leg: Name of the leg, such as fl.
+        repeat: Number of repetitions of the motion.
 
     Raises:
-        CommandError: The joint does not follow, or the recording shows no servo.
+        CommandError: The joint does not follow, or identification fails.
         NoAnswerError: The robot does not report, or commands are not sent.
     """
     (servo,) = (each for each in servos if each.joint == f'{leg}_thigh_joint')
@@ -374,7 +374,7 @@ def _angle(robot: LimpRobot, servo: JointServo) -> float:
 
 
 def _motion(centre: float, repeat: int) -> Iterator[tuple[float, float]]:
-    """Yield pauses before targets [s], and targets [rad]."""
+    """Yield pairs: pause before a target [s], and the target [rad]."""
     uneven = random.Random(1)  # noqa: S311  no secret
     yield 0.0, centre
     for _ in range(repeat):

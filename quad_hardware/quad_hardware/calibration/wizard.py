@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot whose servos a person moves by hand, and the dialogue about its joints."""
+"""A robot with released servos that a person moves by hand, and the joint dialogue."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ REPORTS_BROKE_OFF = f'reports had not arrived for {STALE_TIME} s; they do again'
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """What the IMU reports."""
+    """Measurements of the IMU."""
 
     attitude: Vector  # roll, pitch, yaw [deg]
     acceleration: Vector | None  # specific force [m/s²]; None where it is not reported
@@ -39,7 +39,7 @@ class ImuReading:
 
 
 class LimpRobot:
-    """Reads angles, takes torque away and gives it back."""
+    """Reads servo angles, and switches torque off and on."""
 
     def __init__(self, options: LinkOptions, motors: Collection[int]) -> None:
         self._motors = frozenset(motors)
@@ -49,7 +49,7 @@ class LimpRobot:
         self.driver = Driver(options, self._take, self._forget, self._opened)
 
     def angles(self) -> dict[int, float]:
-        """Return the servo angles [deg] by motor, as they are from now on.
+        """Wait for new reports; return the servo angles [deg] by motor.
 
         Raises:
             NoAnswerError: The robot does not report; the message has the reason.
@@ -62,10 +62,10 @@ class LimpRobot:
         return {m: median(each) for m, each in found.items() if all(map(math.isfinite, each))}
 
     def imu(self) -> ImuReading:
-        """Return what the IMU reports from now on, as a mean.
+        """Return the mean of new IMU reports.
 
         Raises:
-            NoAnswerError: The robot does not report, or no number; the message has the reason.
+            NoAnswerError: The robot does not report, or reports NaN; the message has the reason.
         """
         way, reports = self._read()
         if not all(map(math.isfinite, (angle for r in reports for angle in r.attitude))):
@@ -78,17 +78,17 @@ class LimpRobot:
         return ImuReading(attitude, (x, y, z), way)
 
     def reports(self) -> Sequence[Report]:
-        """Return the reports since the reading before, MAX_REPORTS at most."""
+        """Return the reports since the previous call, MAX_REPORTS at most."""
         with self._changed:
             reports = tuple(self._reports)
             self._reports.clear()
             return reports
 
     def command(self, angles: Mapping[int, float]) -> float:
-        """Command angles [deg] by motor; return when they had left the line [s].
+        """Command angles [deg] by motor; return the time when they had left the line [s].
 
         Raises:
-            NoAnswerError: They were not sent; the message has the reason.
+            NoAnswerError: The angles were not sent; the message has the reason.
         """
         begun = time.monotonic()
         if not self.driver.command(angles):
@@ -100,7 +100,7 @@ class LimpRobot:
         raise self._no_answer(f'a command did not leave within {SEND_TIMEOUT} s')
 
     def rounded(self, motor: int, angle: float) -> float:
-        """Return an angle [deg] as the line brings it to a motor."""
+        """Return an angle [deg] as rounded on the line to a motor."""
         span = self._spans.get(motor)
         return angle if span is None else span.decode(span.encode(angle))
 
@@ -109,12 +109,12 @@ class LimpRobot:
         return time.monotonic()
 
     def wait_until(self, moment: float) -> None:
-        """Wait for a moment on that clock [s]."""
+        """Wait until a time on that clock [s]."""
         time.sleep(max(moment - time.monotonic(), 0.0))
 
     @contextmanager
     def limp(self) -> Iterator[None]:
-        """Switch the torque off, and on again at the end, where the servos are then.
+        """Switch torque off; at the end, switch it on at the present angles.
 
         Raises:
             NoAnswerError: The robot does not report; the message has the reason.
@@ -130,7 +130,7 @@ class LimpRobot:
             self.angles()
 
     def _read(self) -> tuple[Sequence[Report], Sequence[Report]]:
-        """Return the reports since the reading before, and new ones."""
+        """Return the reports since the previous call, and wait for new ones."""
         with self._changed:
             way = tuple(self._reports)
             self._reports.clear()
@@ -157,13 +157,13 @@ class LimpRobot:
 
 @contextmanager
 def limp_robot(options: LinkOptions, motors: Collection[int]) -> Iterator[LimpRobot]:
-    """Find a robot, and leave it in the end.
+    """Connect to a robot, and disconnect at the end.
 
     Args:
-        motors: Ids of those that it has; a board may refuse a command for any other.
+        motors: Ids of the robot's motors; a board may reject commands for others.
 
     Raises:
-        NoAnswerError: It is not found; the message has the reason.
+        NoAnswerError: No robot is found; the message has the reason.
     """
     robot = LimpRobot(options, motors)
     robot.driver.start()
@@ -175,7 +175,7 @@ def limp_robot(options: LinkOptions, motors: Collection[int]) -> Iterator[LimpRo
 
 
 def mean_attitude(attitudes: Iterable[Vector]) -> Vector:
-    """Return the mean of roll, pitch and yaw [deg]; not of each, they leap with the nose up."""
+    """Return the mean rotation as roll, pitch, yaw [deg]: means of each fail with the nose up."""
     rotations = [from_rpy(*map(math.radians, attitude)) for attitude in attitudes]
     first, sums = rotations[0], [0.0] * 4
     for rotation in rotations:  # a quaternion and its negative are one rotation
@@ -187,18 +187,18 @@ def mean_attitude(attitudes: Iterable[Vector]) -> Vector:
 
 
 class CancelledError(Exception):
-    """The person has cancelled; nothing is written."""
+    """The user cancelled; nothing is written."""
 
 
 class Console:
-    """A person at a terminal."""
+    """A user at a terminal."""
 
     def write(self, text: str) -> None:
         """Print a text."""
         print(text, flush=True)  # noqa: T201  # what the program is for
 
     def prompt(self, question: str) -> str:
-        """Return the answer to a question.
+        """Prompt the user; return the answer.
 
         Raises:
             CancelledError: Ctrl-C or Ctrl-D was pressed.
@@ -210,14 +210,14 @@ class Console:
 
 
 def confirm(console: Console, question: str, *, default: bool = False) -> bool:
-    """Return the answer to a question of yes or no."""
+    """Ask a yes-or-no question; return the answer."""
     choices = '[Y/n]' if default else '[y/N]'
     answer = console.prompt(f'{question} {choices}').lower()
     return answer.startswith('y') if answer else default
 
 
 def prompt_number(console: Console, question: str) -> float:
-    """Prompt for a positive number, until there is one."""
+    """Prompt for a positive number until the user enters one."""
     while True:
         answer = console.prompt(question)
         try:
@@ -234,15 +234,15 @@ LIMIT_MARGIN = math.radians(2.0)  # [rad] that targets stay away from a stop
 
 
 def with_zero(servo: JointServo, angle: float) -> JointServo:
-    """Return a servo whose joint is at zero where the servo reads an angle [deg]."""
+    """Set the offset so that the joint is at zero at a servo angle [deg]."""
     return replace(servo, offset=-servo.sign * servo.gain * angle)
 
 
 def with_direction(servo: JointServo, zero: float, turned: float) -> JointServo:
-    """Return a servo whose joint went the positive way from one angle to another [deg].
+    """Set the sign so that motion from one angle to another [deg] is positive.
 
     Raises:
-        CommandError: It was turned by less than MIN_TURN.
+        CommandError: The servo turned by less than MIN_TURN.
     """
     if abs(turned - zero) < MIN_TURN:
         raise CommandError(
@@ -254,10 +254,10 @@ def with_direction(servo: JointServo, zero: float, turned: float) -> JointServo:
 
 
 def with_limits(servo: JointServo, one: float, other: float) -> JointServo:
-    """Return a servo that stays within two ends of its travel [deg], and within its limits so far.
+    """Reduce the limits to two measured ends of travel [deg].
 
     Raises:
-        CommandError: The ends are so close that nothing is left between them.
+        CommandError: The ends are so close that no range is left.
     """
     low, high = sorted((servo.position(one), servo.position(other)))
     lower = max(low + LIMIT_MARGIN, servo.lower)
@@ -271,7 +271,7 @@ def with_limits(servo: JointServo, one: float, other: float) -> JointServo:
 
 
 def moved_motor(before: dict[int, float], after: dict[int, float]) -> int | None:
-    """Return the motor that turned the farthest, None when none turned enough."""
+    """Return the motor that turned farthest; None if none turned enough."""
     turns = {motor: abs(after[motor] - before[motor]) for motor in after if motor in before}
     motor = max(turns, key=turns.__getitem__, default=None)
     return motor if motor is not None and turns[motor] >= MIN_TURN else None
@@ -293,13 +293,13 @@ _ARM_PLACE = ('the joint is where the URDF draws it at zero', 'turn it the way o
 def calibrate_joints(
     console: Console, robot: LimpRobot, servos: Iterable[JointServo], *, limits: bool
 ) -> list[JointServo]:
-    """Record zero, direction and, if wanted, both ends of each joint.
+    """Measure zero, direction and, if requested, both ends of each joint.
 
     Args:
-        limits: Record the ends of the travel as well.
+        limits: Measure the ends of travel as well.
 
     Returns:
-        The servos with what was found.
+        The servos with the measured values.
     """
     return [_calibrate(console, robot, servo, limits=limits) for servo in servos]
 
@@ -353,7 +353,7 @@ def _ends(console: Console, robot: LimpRobot, servo: JointServo) -> JointServo:
 
 
 def place_of(joint: str) -> tuple[str, str]:
-    """Return what zero of a joint looks like, and what moves it the positive way."""
+    """Describe a joint's zero position, and its positive direction."""
     if joint.startswith('arm') and 'yaw' not in joint:
         return _ARM_PLACE
     return next((place for word, place in _PLACES.items() if word in joint), _ARM_PLACE)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Says what is wrong between the serial port and the transforms, and what to do about it."""
+"""Diagnoses the chain from the serial port to the transforms, and suggests remedies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 
 
 class Severity(Enum):
-    """How bad it is."""
+    """Severity of a finding."""
 
     GOOD = 'ok'
     NOTE = 'note'

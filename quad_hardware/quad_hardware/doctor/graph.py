@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is received on ROS topics in a while, judged: nodes, rates, joint names, transforms."""
+"""Checks observed ROS traffic: nodes, rates, joint names, transforms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROOT = 'odom'
 
 
 def links_without_place(links: Iterable[str], parents: Mapping[str, str]) -> list[str]:
-    """Return the links that have no chain of transforms from odom."""
+    """Return the links that no chain of transforms connects to odom."""
     return [link for link in links if not _reaches(link, parents)]
 
 
@@ -55,7 +55,7 @@ _SOURCES = {
 
 @dataclass(slots=True)
 class Observation:
-    """What was received in a while."""
+    """Messages and graph data received during an observation."""
 
     duration: float  # how long [s]
     nodes: set[str] = field(default_factory=set)  # names of nodes
@@ -70,7 +70,7 @@ class Observation:
 
 
 def check_graph(seen: Observation, port: str) -> Iterator[Finding]:
-    """Judge everything that was received."""
+    """Check all observations."""
     bringup = f'ros2 run quad_bringup bringup --port {port}'
     running = [name for name in NODES if name in seen.nodes]
     if not running:
@@ -170,7 +170,7 @@ _LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def observe(duration: float) -> Observation:
-    """Listen to the topics of the robot for a while."""
+    """Subscribe to the robot's topics for a while; return what was received."""
     with closing(GraphClient('quad_doctor', lambda: False)) as client:
         node, seen = client.node, Observation(duration)
         _subscribe(node, seen)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Doctor of the quadruped: finds what is wrong with port, robot, machine and ROS."""
+"""Diagnoses serial port, robot, machine and ROS setup of the quadruped."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MIN_MEMORY = 300e6  # [B] below that, processes are soon ended
 
 
 def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
-    """Check the variables that ROS reads."""
+    """Check the environment variables that ROS reads."""
     if 'AMENT_PREFIX_PATH' not in environment:
         remedy = (
             'source the workspace first: `source env.sh`, or `source /opt/ros/<distro>/setup.bash`'
@@ -64,7 +64,7 @@ def _reach(domain: str, environment: Mapping[str, str]) -> Finding:
 
 
 def check_memory(meminfo: str) -> Iterator[Finding]:
-    """Check the text of /proc/meminfo."""
+    """Check the memory figures in the text of /proc/meminfo."""
     rows = dict(line.split(':', 1) for line in meminfo.splitlines() if ':' in line)
     available = float(rows.get('MemAvailable', '0 kB').split()[0]) * 1024
     if available < MIN_MEMORY:
@@ -75,7 +75,7 @@ def check_memory(meminfo: str) -> Iterator[Finding]:
 
 
 def check_library() -> Finding:
-    """Report whose xgo_lib2 Python finds."""
+    """Report which xgo_lib2 Python imports: ours or the vendor's."""
     spec = importlib.util.find_spec('xgo_lib2')
     if spec is None:
         return warning('xgo_lib2', 'not found', 'build the workspace: it brings one of its own')
@@ -91,7 +91,7 @@ _TERMINAL = re.compile(r'^tty-index:\s*(\d+)$', re.MULTILINE)
 
 
 def check_port(path: str) -> Iterator[Finding]:
-    """Check a port, and contact the robot when no other program has it."""
+    """Check a port, and query the robot if no other program uses the port."""
     if not Path(path).exists():
         ports = [port.device for port in list_ports.comports()]
         there = f'there are {", ".join(ports)}; ' if ports else 'no serial port was found; '
@@ -117,7 +117,7 @@ def check_port(path: str) -> Iterator[Finding]:
 
 
 def check_latency(path: str, latency: float | None) -> Iterator[Finding]:
-    """Judge the latency timer of an adapter [s], where the port has one."""
+    """Check the latency timer of a USB adapter [s], if the port has one."""
     if latency is None:
         return
     what, _, remedy = latency_problem(path, latency).partition(': ')
@@ -128,9 +128,9 @@ def check_latency(path: str, latency: float | None) -> Iterator[Finding]:
 
 
 def port_users(device: str) -> Iterator[str]:
-    """Yield the programs that have a device open, as far as we may see them.
+    """Yield the programs that have a device open, as far as permissions show.
 
-    A simulated robot that keeps its own port open is no user of it, but what answers there.
+    A simulated robot that keeps its own port open does not count as a user.
     """
     for process in Path('/proc').glob('[0-9]*'):
         if int(process.name) == os.getpid():
@@ -145,7 +145,7 @@ def port_users(device: str) -> Iterator[str]:
 
 
 def _makes(process: Path, device: str) -> bool:
-    """Return whether a process has the other end of a pseudo-terminal: the robot's."""
+    """Return whether a process is the simulated robot behind a pseudo-terminal."""
     number = Path(device).name
     for entry in (process / 'fdinfo').iterdir():
         try:
@@ -159,7 +159,7 @@ def _makes(process: Path, device: str) -> bool:
 
 
 def _program(words: list[bytes]) -> str:
-    """Return the name of a program; of a script its own, not the interpreter's."""
+    """Return the name of a program; for a script, its own name."""
     names = [Path(word.decode(errors='replace')).name for word in words if word]
     scripts = [name for name in names[:2] if not name.startswith('python')]
     return (scripts or names or ['?'])[0]
@@ -199,7 +199,7 @@ def _judge_battery(charge: int | None) -> Finding:
 
 
 def run_doctor(argv: Sequence[str]) -> int:
-    """Print all findings; return 1 when one of them is an error, else 0."""
+    """Print all findings; return 1 if any is an error, else 0."""
     options = _parser().parse_args(argv)
     worst = Severity.GOOD
     order = list(Severity)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The serial line: port, probing, conversation and the thread that keeps it going."""
+"""The serial link: port, detection, conversation and its thread."""
 
 from .dialect import Dialect, LinkState, LinkStatus
 from .driver import Driver, QUIET_TIME, STALE_TIME

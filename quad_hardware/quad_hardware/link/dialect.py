@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How one talks to a robot: what is sent when, and what the answers mean.
+"""Conversation with a robot: what to send when, and how to interpret its answers.
 
-A dialect is a state machine without clock, thread or port: time comes in, bytes come out.
+A dialect is a state machine without clock, thread or port: it takes the time and returns bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..report import Report
 
 
 class LinkState(Enum):
-    """What a driver is doing."""
+    """State of a driver."""
 
     CONNECTING = 'connecting'  # no port, or no answer
     FAILED = 'failed'  # an error of ours ended the conversation; it begins anew
@@ -34,7 +34,7 @@ class LinkState(Enum):
 
 @dataclass(slots=True)
 class DialectCounters:
-    """What a dialect has seen since its start."""
+    """Counters of a dialect since its start."""
 
     states: int = 0  # reports of the robot
     lost: int = 0  # reports that never came, by their sequence numbers (v2)
@@ -45,7 +45,7 @@ class DialectCounters:
 
 @dataclass(slots=True)
 class LinkStatus:
-    """How a link is at one moment."""
+    """Snapshot of the state of a link."""
 
     state: LinkState = LinkState.CONNECTING  # what the driver is doing
     detail: str = ''  # in words; why, when it is not running
@@ -64,32 +64,32 @@ class LinkStatus:
     dialect: DialectCounters = field(default_factory=DialectCounters)
 
     def at(self, age: float) -> LinkStatus:
-        """Return a copy at an age of the last report [s]; its counters count no more."""
+        """Return a copy with the age of the last report [s]; its counters are frozen."""
         counters = replace(self.parser), replace(self.dialect)
         return replace(self, age=age, parser=counters[0], dialect=counters[1])
 
     def reason(self, otherwise: str) -> str:
-        """Return why it is not running; another reason where it runs again by now."""
+        """Return why the link is not running; if it is, return the alternative text."""
         return otherwise if self.state is LinkState.RUNNING else self.detail
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What is to be done now."""
+    """Bytes to send now, and the time of the next step."""
 
     send: bytes  # bytes to send, maybe none
     wake: float  # when to come back at the latest, on the clock of the caller [s]
 
 
 class Dialect(ABC):
-    """Conversation with one robot.
+    """Conversation with one robot in one protocol.
 
-    The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
-    frames; and :meth:`handle_frame` for each frame.
+    Call :meth:`step` at its ``wake`` time, after :meth:`command` and after received frames; call
+    :meth:`handle_frame` for each frame.
     """
 
     def __init__(self, protocol: Protocol) -> None:
-        """Begin a conversation."""
+        """Start a conversation."""
         self.protocol = protocol  # what the robot speaks
         self.can_release = True  # the torque of its servos can be switched off
         # what each motor can be sent [deg], where that is less than servos turn
@@ -100,43 +100,43 @@ class Dialect(ABC):
     @property
     @abstractmethod
     def pending(self) -> bool:
-        """Whether a command or a change of torque has not been given to the line yet."""
+        """Whether a command or a change of torque has not been sent yet."""
 
     @property
     def torque_pending(self) -> bool:
-        """Whether a change of torque has not been given to the line yet."""
+        """Whether a change of torque has not been sent yet."""
         return bool(self._torque)
 
     @abstractmethod
     def command(self, angles: Mapping[int, float]) -> None:
-        """Set the finite angles [deg] by motor id that are sent at the next possible moment."""
+        """Set finite angles [deg] by motor id, to send at the next opportunity."""
 
     @abstractmethod
     def torque(self, *, on: bool) -> None:
-        """Switch the torque of all servos at the next possible moment."""
+        """Switch the torque of all servos at the next opportunity."""
 
     @abstractmethod
     def cancel_pending(self) -> None:
-        """Forget a command and a change of torque that have not been sent yet."""
+        """Discard a command and a change of torque that have not been sent yet."""
 
     @abstractmethod
     def step(self, now: float) -> Step:
-        """Return what is to be sent now."""
+        """Return the bytes to send now."""
 
     def handle_sent(self, frame: Any, now: float) -> Mapping[int, float]:  # noqa: ANN401
-        """Process a frame that was sent in a recorded session, in the place of step.
+        """Process a frame sent in a recorded session, instead of calling step.
 
         Returns:
-            The servo angles that it sends, by motor id [deg]; none as a rule.
+            The servo angles in the frame, by motor id [deg]; usually none.
         """
         return {}
 
     @abstractmethod
     def handle_frame(self, frame: Any, now: float) -> Report | None:  # noqa: ANN401
-        """Process a frame of the robot; return the report that it completes, if any."""
+        """Process a frame of the robot; return the report that it completes, or None."""
 
 
 def vector(values: Iterable[float]) -> Vector:
-    """Return three numbers as a vector."""
+    """Return the first three numbers as a vector."""
     x, y, z = values
     return x, y, z

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations in protocol v2, v1 and with the developer firmware.
+"""Conversations in protocols v2 and v1, and with the developer firmware.
 
-In v2 the robot pushes its state, and commands go out at once. In v1 it is polled: 50 times a
-second two bulk reads, and a bulk write between. A bulk write of 12 servos, a read of 15 and a read
-of the IMU take 8.1 ms of a 20 ms period at 115200 baud; one frame per servo, as the vendor's
-library sends them, would not fit. The developer firmware pushes, and is written to as in v1.
+In v2 the robot pushes its state, and commands go out at once. In v1 it is polled: two bulk reads
+at 50 Hz, with a bulk write in between. A bulk write of 12 servos, a read of 15 and a read of the
+IMU take 8.1 ms of a 20 ms period at 115200 baud; one frame per servo, as the vendor's library
+sends them, would not fit. The developer firmware pushes states and accepts the writes of v1.
 """
 
 from __future__ import annotations
@@ -63,26 +63,25 @@ No page of the vendor says the unit; 9.2 rad/s is what the servo's data sheet al
 
 
 class UnseenServo:
-    """Keeps the ends of where a servo may be, which move to its target as slowly as it may.
+    """Tracks the possible range of an unreported servo while it moves to its target.
 
-    Protocol v1 reads 15 of 16 servos; the yaw of the arm, 54, is the one that is left out. The
-    first time that it is sent somewhere, it may turn by its whole range, so it is sent at the
-    lowest speed, until it must have arrived.
+    Protocol v1 reads 15 of 16 servos, all but the yaw of the arm, 54. Its first motion may span
+    the whole range, so it runs at the lowest speed until it must have arrived.
     """
 
     def __init__(self, span: Span, now: float) -> None:
-        """Begin with a servo that may be anywhere in its range [deg]."""
+        """Start with a servo anywhere in its range [deg]."""
         self._low, self._high = span.low, span.high
         self._target = math.nan
         self._at = now
 
     def send(self, angle: float, now: float) -> None:
-        """Send it somewhere [deg]."""
+        """Set its target [deg]."""
         self._advance(now)
         self._target = angle
 
     def arrived(self, now: float) -> bool:
-        """Return whether it must be where it was sent."""
+        """Return whether the servo must have reached its target."""
         self._advance(now)
         return self._low == self._target == self._high
 
@@ -108,7 +107,7 @@ class _Request:
 
     @property
     def wire_time(self) -> float:
-        """Time on the line, request and answer [s]."""
+        """Time on the line for request and answer [s]."""
         return V1.wire_time(len(self.encode()) + V1.overhead + self.size)
 
 
@@ -118,14 +117,14 @@ _READ_BATTERY = _Request(Register.BATTERY, 1)
 
 
 class V1Dialect(Dialect):
-    """Polls a robot; a command goes out as soon as the line is free.
+    """Polls a robot; sends a command as soon as the line is free.
 
-    A board that is slower than the period makes the reports fewer. How long an answer is waited
-    for follows from how long others took, so that a lost one costs little on a quick board.
+    A board slower than the period reduces the report rate. The answer time-out adapts to measured
+    answer times, so that a lost answer costs little on a quick board.
     """
 
     def __init__(self, now: float, model: Model = Model.LITE, rate: float = 50.0) -> None:
-        """Begin a conversation, with a rate of reports [Hz]."""
+        """Start a conversation with a report rate [Hz]."""
         super().__init__(V1)
         self.spans = ANGLE_SPANS[model]
         self._period = 1.0 / rate
@@ -147,32 +146,32 @@ class V1Dialect(Dialect):
 
     @property
     def pending(self) -> bool:
-        """Whether a command or a change of torque has not been given to the line yet."""
+        """Whether a command or a change of torque has not been sent yet."""
         return bool(self._legs or self._arm or self._torque)
 
     def command(self, angles: Mapping[int, float]) -> None:
-        """Set the angles that are sent when the line is free.
+        """Set the angles to send when the line is free.
 
-        All legs go in one frame, so all of them must be there; the arm follows, where it changed
-        or was last sent a while ago; a servo that is not reported goes slowly at first.
+        One frame carries all legs, so angles of all legs are required. The arm follows if it
+        changed or was last sent a while ago; an unreported servo moves slowly at first.
         """
         self._legs = bytes(self.spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
         for motor in angles.keys() - set(LEG_MOTORS):
             self._arm[motor] = bytes((self.spans[motor].encode(angles[motor]),))
 
     def torque(self, *, on: bool) -> None:
-        """Switch the torque of all servos, behind a pending command."""
+        """Switch the torque of all servos, after a pending command."""
         self._forget_arm()
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
     def cancel_pending(self) -> None:
-        """Forget what has not been sent yet."""
+        """Discard orders that have not been sent yet."""
         self._legs = self._torque = b''
         self._arm.clear()
         self._forget_arm()
 
     def step(self, now: float) -> Step:
-        """Return the next frame, where one is due and the line is free."""
+        """Return the next frame if one is due and the line is free."""
         if self._waiting is not None and now >= self._deadline(self._waiting):
             self._give_up()
         if self._waiting is None and not self._queue and now >= self._cycle_at:
@@ -183,7 +182,7 @@ class V1Dialect(Dialect):
         return Step(send, self._wake())
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
-        """Process an answer; with the one of the IMU a report is complete."""
+        """Process an answer; that of the IMU completes a report."""
         waiting = self._waiting
         if (
             waiting is None
@@ -206,7 +205,7 @@ class V1Dialect(Dialect):
         return None
 
     def handle_sent(self, frame: Frame, now: float) -> Mapping[int, float]:
-        """Wait for what a frame that was sent requests; return the angles that it sends."""
+        """Expect the answer to a frame that was sent; return the angles in the frame."""
         if frame.kind is Kind.READ:
             self._expect(frame, now)
         if frame.kind is not Kind.WRITE or frame.address not in MOTOR_OF_REGISTER:
@@ -234,7 +233,7 @@ class V1Dialect(Dialect):
         return self._requested_at + request.wire_time + self._latency_limit
 
     def _give_up(self) -> None:
-        """Go on without an answer: the rest of this period is of no use."""
+        """Abandon the answer and the rest of this period."""
         self.counters.unanswered += 1
         self._latency_limit = min(1.5 * self._latency_limit, MAX_LATENCY)
         self._waiting = None
@@ -297,7 +296,7 @@ class V1Dialect(Dialect):
         return FULL_SPEED
 
     def _forget_arm(self) -> None:
-        """Send the arm anew, for it may have been moved."""
+        """Send the arm again, because something may have moved it."""
         self._arm_sent.clear()
         self._unseen.clear()
 
@@ -322,7 +321,7 @@ class V1Dialect(Dialect):
 
 
 def _on_the_line(payload: bytes) -> float:
-    """Return how long the answer with a payload takes [s]."""
+    """Return the time on the line of an answer with this payload [s]."""
     return V1.wire_time(V1.overhead + len(payload))
 
 
@@ -330,10 +329,10 @@ SERVO_PERIOD = 1 / 26  # [s] in which the developer firmware measures the servos
 
 
 class DeveloperDialect(V1Dialect):
-    """Listens to the developer firmware, which cannot be asked, and writes to it as in v1."""
+    """Receives from the developer firmware, which cannot be polled; writes as in v1."""
 
     def __init__(self, now: float, model: Model = Model.MINI) -> None:
-        """Begin a conversation."""
+        """Start a conversation."""
         super().__init__(now, model)
         self.protocol = DEVELOPER
         self._cycle_at, self._speed = math.inf, FULL_SPEED  # it is not polled, nor set a speed
@@ -341,7 +340,7 @@ class DeveloperDialect(V1Dialect):
         self._motors: tuple[float, ...] = ()  # bytes that were measured last
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
-        """Process a frame of the robot; every push is a report."""
+        """Process a frame of the robot; each pushed frame is a report."""
         if frame.address != PUSHED.address or not PUSHED.accepts(len(frame.payload)):
             self.counters.unusable += 1
             return None
@@ -375,10 +374,10 @@ _SEQUENCE = 1 << 16
 
 
 class V2Dialect(Dialect):
-    """Requests 50 states a second, and again whenever they stop coming."""
+    """Requests 50 states a second, and repeats the request if they stop."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
-        """Begin a conversation, with a rate of reports [Hz]."""
+        """Start a conversation with a report rate [Hz]."""
         super().__init__(V2)
         requests = (
             Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),
@@ -391,25 +390,25 @@ class V2Dialect(Dialect):
 
     @property
     def pending(self) -> bool:
-        """Whether a command or a change of torque has not been given to the line yet."""
+        """Whether a command or a change of torque has not been sent yet."""
         return bool(self._pending or self._torque)
 
     def command(self, angles: Mapping[int, float]) -> None:
-        """Set the angles that are sent at the next step, in one frame."""
+        """Set the angles to send at the next step, in one frame."""
         payload = _SERVOS.pack(motor=angles, angle=angles.values())
         self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(V2)
 
     def torque(self, *, on: bool) -> None:
-        """Switch the torque of all servos, behind a pending command."""
+        """Switch the torque of all servos, after a pending command."""
         payload = V2.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
         self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(V2)
 
     def cancel_pending(self) -> None:
-        """Forget what has not been sent yet."""
+        """Discard orders that have not been sent yet."""
         self._pending = self._torque = b''
 
     def step(self, now: float) -> Step:
-        """Return a pending command, and the request for states where they are missing."""
+        """Return a pending command, and a request for states if they are missing."""
         send, self._pending, self._torque = self._pending + self._torque, b'', b''
         if now >= self._request_at:
             self._request_at = now + REQUEST_PERIOD
@@ -417,7 +416,7 @@ class V2Dialect(Dialect):
         return Step(send, self._request_at)
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
-        """Process a frame of the robot; every state frame is a report."""
+        """Process a frame of the robot; each state frame is a report."""
         if frame.kind is Kind.NACK:
             self.counters.refused += 1
         if frame.kind is not Kind.PUSH or frame.address != STATE.address:
@@ -432,7 +431,7 @@ class V2Dialect(Dialect):
         return _report(values, now)
 
     def handle_sent(self, frame: Frame, now: float) -> Mapping[int, float]:
-        """Return the angles of a servo frame that was sent."""
+        """Return the angles in a servo frame that was sent."""
         if frame.kind is not Kind.WRITE or frame.address != Code.SERVOS:
             return {}
         try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the conversation with a robot going in a thread of its own, whatever the cable does."""
+"""Thread that runs the conversation with a robot and reconnects after a loss."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _log = logging.getLogger(__name__)
 class Driver:
     """A robot on a serial port.
 
-    ``on_state`` is called in the thread of the driver for each report and says why it cannot be,
-    or nothing when it is taken; ``on_change`` when the state of the link changes. Both must be
-    quick; when one of them fails, the conversation begins anew, and the link says so. Nothing is
-    sent to servos while no report is taken: they hold their last target.
+    The driver's thread calls ``on_state`` for each report, which returns why it is implausible, or
+    an empty text to accept it; and ``on_change`` when the link state changes. Both must be quick;
+    if one of them raises, the conversation restarts and the link status reports it. The driver
+    sends nothing to servos until a report is accepted: they hold their last target.
 
-    ``command`` and ``torque`` are for one other thread. An order that was accepted is sent,
-    replaced by a newer one of its kind, or the change of the link's state says that it was not.
+    Call ``command`` and ``torque`` from one other thread. An accepted order is sent or replaced by
+    a newer one of its kind; otherwise a change of the link state reports that it was not sent.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Driver:
         on_change: Callable[[LinkState, str], None],
         on_open: Callable[[Session], None] = lambda _: None,
     ) -> None:
-        """Prepare; :meth:`start` begins. ``on_open`` takes each new session before it is used."""
+        """Set up the driver; :meth:`start` begins. ``on_open`` gets each new session first."""
         self._options = options
         self._on_state = on_state
         self._on_change = on_change
@@ -70,12 +70,12 @@ class Driver:
         self._received_at = self._reported_at = -float('inf')
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start the thread, which calls ``begin`` and looks for the robot until it finds it."""
+        """Start the thread; it calls ``begin``, then looks for the robot until it is found."""
         self._begin = begin
         self._thread.start()
 
     def stop(self) -> None:
-        """Send what was accepted, end the thread and close the port; servos hold their target."""
+        """Send accepted orders, end the thread and close the port; servos hold their targets."""
         self._stopping.set()
         self._wake()
         if self._thread.is_alive():
@@ -87,10 +87,10 @@ class Driver:
         """Send servo angles at once; a newer command replaces one not sent yet.
 
         Args:
-            angles: By motor id [deg]; all legs, and the arm where it is fitted.
+            angles: Angles by motor id [deg]: all legs, and the arm if fitted.
 
         Returns:
-            False when the link is not running, and nothing will be sent.
+            False if the link is not running; then nothing is sent.
         """
         with self._lock:
             if accepted := self._accepts:
@@ -105,9 +105,9 @@ class Driver:
         """Switch the torque of all servos; without it the robot drops.
 
         Returns:
-            False when the link is not running or cannot do that, and nothing will be sent. True
-            when it is sent with the next bytes; if the robot is lost before, the change of the
-            link's state says that it was not.
+            False if the link is not running or does not support it; then nothing is sent. True
+            if it goes out with the next bytes; if the robot is lost before that, the change of the
+            link state reports it.
         """
         session = self._session
         able = session is not None and session.dialect.can_release
@@ -121,16 +121,16 @@ class Driver:
 
     @property
     def waits(self) -> bool:
-        """Whether a command was accepted that the thread has not taken over yet."""
+        """Whether an accepted command has not been picked up by the thread yet."""
         return self._angles is not None
 
     @property
     def limp(self) -> bool:
-        """Whether the servos were let go: from that order on, until they are known to hold."""
+        """Whether the servos are released, from the order until they are known to hold."""
         return self._released or self._limp
 
     def status(self) -> LinkStatus:
-        """Return how the link is now."""
+        """Return the present link status."""
         return self._status.at(time.monotonic() - self._reported_at)
 
     def _wake(self) -> None:
@@ -178,7 +178,7 @@ class Driver:
             _log.exception('the failure could not be reported')
 
     def _converse(self) -> None:
-        """Search for the robot once, and serve it until it is lost."""
+        """Search for the robot once, and run the session until it is lost."""
         try:
             session = open_session(self._options)
         except LinkError as error:
@@ -229,12 +229,12 @@ class Driver:
             bytes_at = self._listen(session, max(timeout, 0.0), bytes_at)
 
     def _owes(self, dialect: Dialect) -> bool:
-        """Return whether an order was accepted that is still to be sent."""
+        """Return whether an accepted order has not been sent yet."""
         ordered = self._angles is not None or self._torque is not None
         return self._status.state is LinkState.RUNNING and (dialect.pending or ordered)
 
     def _deadline(self, now: float) -> float:
-        """Return when silence has lasted long enough to do something about it [s]."""
+        """Return the time at which silence requires action [s]."""
         ends = (self._reported_at + STALE_TIME, self._received_at + STALE_TIME)
         return min(
             (end for end in ends if end >= now), default=self._received_at + RECONNECT_TIMEOUT
@@ -260,7 +260,7 @@ class Driver:
             self._limp = self._limp or not torque  # half of it may leave before the line breaks
 
     def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
-        """Wait for bytes or a command; return when bytes last came [s]."""
+        """Wait for bytes or a command; return the time of the last bytes [s]."""
         port, parser = session.port, session.parser
         line = port.fileno()
         readable, _, _ = select.select([line, self._wake_read], [], [], timeout)

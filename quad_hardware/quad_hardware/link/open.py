@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a robot: asks its firmware version, or listens, in one protocol after the other."""
+"""Detects a robot: requests its firmware version, or waits for pushes, protocol by protocol."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ATTEMPTS = 2
 
 
 class Value(NamedTuple):
-    """What either protocol can be asked for."""
+    """Values that can be read in either protocol."""
 
     code: Code  # of protocol v2
     register: Register  # of protocol v1
@@ -62,7 +62,7 @@ BATTERY = Value(Code.BATTERY, Register.BATTERY, 1)
 
 @dataclass(frozen=True, slots=True)
 class LinkOptions:
-    """Where the robot is, and how to talk to it."""
+    """Location of the robot, and the protocol options."""
 
     path: str  # device file
     protocols: tuple[Protocol, ...] = PROTOCOLS  # what to try, in this order
@@ -76,7 +76,7 @@ class LinkOptions:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """An open connection to a robot, with the parser and dialect of its protocol."""
+    """An open connection to a robot, with its parser and dialect."""
 
     port: SerialPort  # the open port, owned by the holder of the session
     firmware: str  # version of the robot
@@ -86,10 +86,10 @@ class Session:
 
 
 def open_session(options: LinkOptions) -> Session:
-    """Find the robot: by the vendor's library where that is wanted, else by asking it.
+    """Find the robot: with the vendor's library if requested, else by probing.
 
     Raises:
-        LinkError: There is no robot, or it is none that walks; the message says what was tried.
+        LinkError: No robot was found, or not a walking one; the message lists the attempts.
     """
     now = time.monotonic()
     if options.vendor:
@@ -113,14 +113,14 @@ def open_session(options: LinkOptions) -> Session:
 
 
 def make_dialect(protocol: Protocol, model: Model | None, now: float, rate: int = 50) -> Dialect:
-    """Return how to talk to a robot, with the ranges of a model but in v2; reports at [Hz]."""
+    """Return the dialect for a protocol; except in v2, the model sets the ranges; rate in [Hz]."""
     if model is None:
         return V2Dialect(now, rate)
     return DeveloperDialect(now, model) if protocol is DEVELOPER else V1Dialect(now, model, rate)
 
 
 def _model(firmware: str, protocol: Protocol, options: LinkOptions) -> Model | None:
-    """Return whose ranges scale bytes; None in protocol v2."""
+    """Return the model whose ranges scale bytes; None in protocol v2."""
     known, preset = model_of_firmware(firmware), options.preset
     asked = options.model is None and known is not None and {known.value, preset} <= {*PRESETS}
     if asked and known and known.value != preset:
@@ -150,18 +150,18 @@ class Connection:
 
 
 def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0) -> Connection:
-    """Open a port and request the firmware version, in one protocol after the other.
+    """Open a port and request the firmware version, protocol by protocol.
 
     Args:
-        protocols: What to try, in this order.
-        baud: Speed [bit/s]; 0 takes each protocol's own.
+        protocols: Protocols to try, in this order.
+        baud: Speed [bit/s]; 0 selects each protocol's own.
 
     Returns:
-        The first that answers.
+        The first connection with an answer.
 
     Raises:
         LinkError: The port cannot be opened or was lost.
-        NoAnswerError: There is no answer; the message says what was tried.
+        NoAnswerError: No robot answers; the message lists the attempts.
     """
     tried = []
     for protocol in protocols:
@@ -180,12 +180,12 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
 
 
 def is_pseudo_terminal(path: str) -> bool:
-    """Return whether a simulated robot is behind a device file, or a link to one."""
+    """Return whether a device file, or a link to one, belongs to a simulated robot."""
     return Path(path).resolve().is_relative_to(PSEUDO_TERMINALS)
 
 
 def silence_cause(path: str) -> str:
-    """Return what to check where there is no answer on a port."""
+    """Return what to check if nothing answers on a port."""
     if is_pseudo_terminal(path):
         return (
             'it is a pseudo-terminal: does the simulated robot behind it still start, and is this '
@@ -201,7 +201,7 @@ def read_value(
     timeout: float = ANSWER_TIME,
     attempts: int = ATTEMPTS,
 ) -> bytes | None:
-    """Read a value of a robot; return its bytes, None when it does not answer.
+    """Read a value of a robot; return its bytes, None without an answer.
 
     Raises:
         LinkError: The port was lost.
@@ -221,7 +221,7 @@ def read_value(
 def _ask(
     port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
 ) -> bytes | None:
-    """Return the payload that answers a request within a time [s]; of another size [B] is none."""
+    """Return the payload of an answer within a time [s]; ignore payloads of other sizes [B]."""
     parser, wanted = StreamParser(protocol, ROBOT_KINDS), request.kind
     if wanted is Kind.READ:  # what is pushed comes unasked
         wanted = Kind.REPLY

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A serial port that is read without waiting, so that one thread can wait for several things."""
+"""A non-blocking serial port, so that one thread can wait for several events."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ MAX_LATENCY = 0.004  # [s] a report every 20 ms does not suffer from
 
 
 def latency_timer(path: str, sysfs: Path = SYSFS) -> float | None:
-    """Return the latency timer of an adapter [s]; None where the port has none.
+    """Return the latency timer of a USB adapter [s]; None if the port has none.
 
-    FTDI's send what is no full packet when it has run out: 16 ms as delivered, so a report of the
-    robot comes that much late, and a question of protocol v1 is answered that much later.
+    FTDI adapters send a partial packet only when it expires, by default after 16 ms, which delays
+    each report of the robot and each answer in protocol v1.
 
     Args:
         path: Device file, or a link to one.
@@ -42,7 +42,7 @@ def latency_timer(path: str, sysfs: Path = SYSFS) -> float | None:
 
 
 def latency_problem(path: str, latency: float | None) -> str:
-    """Return that an adapter keeps bytes back for too long, and the remedy; else nothing.
+    """Return a warning and its remedy if an adapter delays bytes too much; else empty.
 
     Args:
         path: Device file, or a link to one.
@@ -69,7 +69,7 @@ Recorder = Callable[[float, bytes, bool], None]
 
 
 class SerialPort:
-    """An open serial port, 8N1, which no other program of ours can open at the same time."""
+    """An open serial port, 8N1, locked against other programs of ours."""
 
     recorders: Sequence[Recorder] = ()  # take the bytes that pass; those that are refused do not
 
@@ -81,7 +81,7 @@ class SerialPort:
             baud: Speed [bit/s].
 
         Raises:
-            LinkError: It cannot be opened; the message names the remedy.
+            LinkError: The port cannot be opened; the message names the remedy.
         """
         self.path = path
         self.baud = baud
@@ -102,7 +102,7 @@ class SerialPort:
         return int(self._serial.fileno())
 
     def read(self) -> bytes:
-        """Return what has arrived; to be called when :mod:`select` says that something has.
+        """Return the received bytes; call it when :mod:`select` reports data.
 
         Raises:
             LinkError: The port is gone.
@@ -119,7 +119,7 @@ class SerialPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send bytes; waits for :data:`WRITE_TIMEOUT` at most.
+        """Send bytes; wait for at most :data:`WRITE_TIMEOUT`.
 
         Raises:
             LinkError: The port is gone, or takes no more bytes.
@@ -149,7 +149,7 @@ class SerialPort:
         self._serial.close()
 
     def __enter__(self) -> Self:
-        """Use it in a with statement."""
+        """Return the port."""
         return self
 
     def __exit__(self, *_error: object) -> None:

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The vendor's own xgo_lib2 as a way to a robot, where it is installed.
+"""Uses the vendor's own xgo_lib2 to connect to a robot, if installed.
 
-It knows the layout of protocol v2, which is not public. What is public of it is used as it
-is: ``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
+It knows the layout of protocol v2, which is not public. This module uses its public parts:
+``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
 ``feedback.SendStateParser.feed_bytes``, and the names in its states. The method that writes a
-servo angle by motor id is not public, and has to be named. Looked for, and reported when they are
-not found, are the serial port inside XgoDog and the name of the acceleration.
+servo angle by motor id is not public; the user has to name it. This module searches for the serial
+port inside XgoDog and the name of the acceleration, and reports if it finds none.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WriteAngle = Callable[[int, float], object]
 
 
 def is_installed() -> bool:
-    """Return whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
+    """Return whether ``import xgo_lib2`` loads the vendor's library, not our stand-in."""
     try:
         library = importlib.import_module('xgo_lib2')
     except ImportError:
@@ -38,7 +38,7 @@ def is_installed() -> bool:
 
 
 def find_descriptor(dog: object, depth: int = 2) -> int | None:
-    """Return the descriptor of the open port among the attributes of an object, or of theirs."""
+    """Return the descriptor of the open port in an object's attributes, or in theirs."""
     slots = (getattr(dog, name, None) for name in getattr(dog, '__slots__', ()))
     for value in (*getattr(dog, '__dict__', {}).values(), *slots):
         if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
@@ -51,10 +51,10 @@ def find_descriptor(dog: object, depth: int = 2) -> int | None:
 def find_write_method(dog: object, name: str) -> WriteAngle:
     """Return the method that writes a servo angle.
 
-    Nothing public says its name, and a wrong one would move servos in another unit or not at all.
+    Its name is not public, and a wrong method could move servos in another unit or not at all.
 
     Raises:
-        LinkError: It has no method of that name; the message lists those it has.
+        LinkError: The object has no method of that name; the message lists its methods.
     """
     methods = dict(inspect.getmembers(dog, callable))
     if name in methods and not name.startswith('_'):
@@ -81,10 +81,10 @@ class VendorPort(SerialPort):
     """The serial port inside the vendor's XgoDog."""
 
     def __init__(self, path: str) -> None:
-        """Open a robot by the vendor's library.
+        """Connect to a robot with the vendor's library.
 
         Raises:
-            LinkError: The library cannot, or has no serial port that is found.
+            LinkError: The library failed, or its serial port was not found.
         """
         self.path = path
         self.baud = VENDOR.baud  # as far as is known
@@ -118,10 +118,10 @@ class VendorPort(SerialPort):
         return self._descriptor
 
     def write(self, data: bytes) -> None:
-        """Send nothing: the vendor's methods send by themselves."""
+        """Do nothing: the vendor's methods send by themselves."""
 
     def close(self) -> None:
-        """Close the robot as the vendor's library does it."""
+        """Close the robot as the vendor's library does."""
         close = getattr(self.dog, 'close', None)
         if callable(close):
             close()
@@ -132,7 +132,7 @@ class VendorPort(SerialPort):
 
 
 class VendorParser:
-    """The vendor's parser."""
+    """Adapter of the vendor's parser."""
 
     def __init__(self) -> None:
         feedback = importlib.import_module('xgo_lib2.feedback')
@@ -141,7 +141,7 @@ class VendorParser:
         self.pending = 0
 
     def feed(self, data: bytes) -> list[object]:
-        """Parse bytes; return the states that they complete."""
+        """Parse bytes; return the completed states."""
         self.counters.bytes += len(data)
         try:
             states = list(self._parser.feed_bytes(data))
@@ -151,21 +151,21 @@ class VendorParser:
         return states
 
     def expire(self) -> list[object]:
-        """Return nothing: what waits is known to the vendor's parser only."""
+        """Return nothing: only the vendor's parser knows the buffered bytes."""
         return []
 
 
 class VendorDialect(Dialect):
-    """States of the vendor's parser; commands by the vendor's methods."""
+    """Receives states from the vendor's parser; sends commands by the vendor's methods."""
 
     def __init__(self, dog: Any, now: float, method: str) -> None:  # noqa: ANN401
-        """Begin a conversation.
+        """Start a conversation.
 
         Args:
             method: Name of the method that writes the angle [deg] of a motor by its id.
 
         Raises:
-            LinkError: There is no such method.
+            LinkError: The method does not exist.
         """
         super().__init__(VENDOR)
         self.can_release = False
@@ -182,18 +182,18 @@ class VendorDialect(Dialect):
         return bool(self._angles)
 
     def command(self, angles: Mapping[int, float]) -> None:
-        """Set the angles that are written at the next step."""
+        """Set the angles to write at the next step."""
         self._angles = dict(angles)
 
     def torque(self, *, on: bool) -> None:
-        """Do nothing: no public method of the vendor's library does it."""
+        """Do nothing: the vendor's library has no public method for it."""
 
     def cancel_pending(self) -> None:
-        """Forget a command that has not been sent yet."""
+        """Discard a command that has not been sent yet."""
         self._angles = {}
 
     def step(self, now: float) -> Step:
-        """Write angles, and request states where they are missing.
+        """Write angles, and request states if they are missing.
 
         Raises:
             LinkError: The vendor's library failed.
@@ -210,10 +210,10 @@ class VendorDialect(Dialect):
         return Step(b'', self._request_at)
 
     def handle_frame(self, frame: object, now: float) -> Report | None:
-        """Process a state of the vendor's parser; what it does not report is not made up.
+        """Process a state of the vendor's parser; missing values stay missing.
 
         Raises:
-            LinkError: The state has not what is public of it.
+            LinkError: The state lacks its public fields.
         """
         self._request_at = now + REQUEST_PERIOD
         self.counters.states += 1

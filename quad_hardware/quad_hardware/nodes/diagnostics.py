@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The link, the robot and the joint commands as /diagnostics (REP 107)."""
+"""Publishes link, robot and joint commands as /diagnostics (REP 107)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _LINK_LEVELS = {
 
 
 class LinkDiagnostic:
-    """Describes the serial link, look by look: damage is judged since the last one."""
+    """Describes the serial link; damage is counted since the last call."""
 
     def __init__(self) -> None:
         # what is wrong with its frames since the last look; empty while they are good
@@ -53,7 +53,7 @@ class LinkDiagnostic:
     def describe(
         self, node: str, port: str, status: LinkStatus, recording: str = ''
     ) -> DiagnosticStatus:
-        """Describe the link and the last file of its black box, and begin to look anew."""
+        """Describe the link and the last black box file; restart the counting."""
         level, message = _LINK_LEVELS[status.state], status.detail
         parser = status.parser
         frames, damaged = self._since(parser)
@@ -82,7 +82,7 @@ class LinkDiagnostic:
         return _status(level, f'{node}: {LINK}', message, port, values)
 
     def _since(self, parser: ParserCounters) -> tuple[int, int]:
-        """Return the valid and the damaged frames since the last look."""
+        """Return the valid and damaged frames since the last call."""
         since = parser.frames - self._frames, parser.damaged - self._damaged
         self._frames, self._damaged = parser.frames, parser.damaged
         # another connection counts from 0
@@ -101,8 +101,8 @@ def robot_diagnostic(
     """Describe battery, servos and IMU.
 
     Args:
-        gravity_error: Between accelerometer and attitude [rad]; None while it is not known.
-        recording: Last file of the black box with a fault of it; empty before one.
+        gravity_error: Angle between accelerometer and attitude [rad]; None if unknown.
+        recording: Last black box file about a robot fault; empty if none.
     """
     level, message = DiagnosticStatus.OK, 'no faults'
     signs_checked = state.imu is not None and not state.imu.is_uncertain
@@ -150,7 +150,7 @@ def robot_diagnostic(
 
 
 def command_diagnostic(node: str, port: str, counters: CommandCounters) -> DiagnosticStatus:
-    """Describe what became of joint commands, and begin to look anew."""
+    """Describe the handling of joint commands; restart the counting."""
     level = DiagnosticStatus.WARN if counters.troubled else DiagnosticStatus.OK
     message = counters.reason if counters.troubled else f'{counters.received} received'
     if counters.loss:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware hardware_node``: the robot on its serial port as ROS topics."""
+"""``ros2 run quad_hardware hardware_node``: ROS interface of a robot on its serial port."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from th
 
 
 class HardwareNode(Node):
-    """Publishes what the robot reports, and sends it what ``/joint_command`` requests.
+    """Publishes the robot's reports and sends it the commands on ``/joint_command``.
 
-    Reports are published in the driver's thread, so that nothing delays them; commands are
-    checked in a callback and handed to that thread.
+    The driver's thread publishes reports, so that nothing delays them; a callback checks commands
+    and passes them to that thread.
     """
 
     @destroyed_when_refused
@@ -55,8 +55,8 @@ class HardwareNode(Node):
         """Declare parameters, topics and the driver; :meth:`begin` opens the port.
 
         Raises:
-            ParameterError: A parameter is misspelt or of the wrong kind.
-            HardwareError: Parameters or the URDF do not make sense.
+            ParameterError: A parameter is misspelt or of the wrong type.
+            HardwareError: Parameters or the URDF are invalid.
         """
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
@@ -88,7 +88,7 @@ class HardwareNode(Node):
         self._robot.start(lambda: raise_thread_priority(self, priority, 'the serial driver'))
 
     def end(self) -> None:
-        """Close the port; the servos hold their last target, at rest."""
+        """Close the port; the servos hold their last targets."""
         for future in self._torque_off_requests:
             future.cancel()
         self._robot.end(self.get_logger().error)
@@ -97,7 +97,7 @@ class HardwareNode(Node):
         self.get_logger().warning(f'report refused: {reason}', throttle_duration_sec=WARN_PERIOD)
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
-        """Log how the link is; runs in the thread of the driver."""
+        """Log a change of the link; runs in the driver's thread."""
         if state is LinkState.RUNNING:
             notify_ready()
         log_link(self, state, detail)
@@ -115,7 +115,7 @@ class HardwareNode(Node):
             self._silence.reset()
 
     def _miss_commands(self) -> None:
-        """Bring the robot down when the end of its commands is a hazard, or log why not."""
+        """Bring the robot down if missing commands are a hazard, or log why not."""
         if self._robot.is_commanded:
             return  # a command came while the timer's event waited for the executor
         loss = self._robot.miss_commands()
@@ -135,9 +135,9 @@ class HardwareNode(Node):
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _set_torque(self, request: SetBool.Request) -> Future[SetBool.Response]:
-        """Switch the torque of the servos off, or on where they are.
+        """Switch torque off, or on at the servos' present angles.
 
-        Torque off is answered when the servos report after it whether they let go.
+        Torque off is answered once later reports show whether the servos released.
         """
         on, future = bool(request.data), Future[SetBool.Response]()
         if not self._robot.set_torque(on=on):
@@ -153,7 +153,7 @@ class HardwareNode(Node):
         return future
 
     def _check_torque_off(self) -> None:
-        """Answer requests for torque off as soon as reports show what became of it."""
+        """Answer pending torque-off requests once reports show the result."""
         found = self._robot.check_torque_off()
         if found is not None:
             self._answer_torque_off(found.succeeded, found.value)
@@ -175,14 +175,14 @@ class HardwareNode(Node):
             self._robot.fault(LINK, self._damage)
 
     def _recording(self, subject: str) -> str:
-        """Return the last file of the black box, or that of a subject; empty before one."""
+        """Return the last black box file, or that of a subject; empty before one."""
         box = self._robot.black_box
         path = None if box is None else box.recording_of(subject) if subject else box.last
         return '' if path is None else str(path)
 
 
 def _check_rest(message: JointCommand, rest: Sequence[float]) -> None:
-    """Refuse velocities and efforts that do not fit the positions; servos take neither."""
+    """Reject velocities and efforts of wrong length or with non-finite numbers."""
     for name, values in (('velocity', message.velocity), ('effort', message.effort)):
         if values and len(values) != len(message.position):
             raise CommandError(

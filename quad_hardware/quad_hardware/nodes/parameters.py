@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of ``hardware_node``: what they mean, their ranges, and what they make."""
+"""Parameters of ``hardware_node``: meaning, ranges, and the settings made from them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands s
 
 
 class FootprintMode(Enum):
-    """How the frames hang together."""
+    """Place of base_footprint in the frame tree."""
 
     CHILD = 'child'  # odom, base_link, base_footprint
     PARENT = 'parent'  # odom, base_footprint, base_link
@@ -41,7 +41,7 @@ class FootprintMode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Names of the frames, and how they hang together."""
+    """Frame names and their tree."""
 
     odom_frame: str = switch('odom', 'where the robot began')
     base_frame: str = switch('base_link', 'the body')
@@ -56,7 +56,7 @@ class Frames:
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
-    """Standard deviations that are published with the IMU."""
+    """Standard deviations published with the IMU."""
 
     orientation_stddev: float = setting(0.02, 0.0, 10.0, '[rad]')
     angular_velocity_stddev: float = setting(0.2, 0.0, 10.0, 'differentiated [rad/s]')
@@ -79,8 +79,8 @@ def declare_parameters(node: Node) -> NodeSettings:
     """Declare all parameters of the node and read them.
 
     Raises:
-        ParameterError: One is misspelt, of another kind or out of its range.
-        CommandError: They do not fit the robot; the message names the remedy.
+        ParameterError: A parameter is misspelt, of the wrong type or out of range.
+        CommandError: Parameters do not match the robot; the message names the remedy.
     """
     read = ParameterReader(node)
     protocols = read.choice(
@@ -125,11 +125,11 @@ def declare_parameters(node: Node) -> NodeSettings:
 
 
 def declare_robot(read: ParameterReader, link: LinkOptions, **given: Any) -> RobotSettings:  # noqa: ANN401
-    """Declare which robot it is and how its reports are read.
+    """Declare the parameters of the robot and of reading its reports.
 
     Raises:
-        ParameterError: One is of another kind or out of its range.
-        CommandError: They do not fit the robot; the message names the remedy.
+        ParameterError: A parameter has the wrong type or is out of range.
+        CommandError: Parameters do not match the robot; the message names the remedy.
     """
     urdf = _urdf(read)
     estimator = read.settings(
@@ -142,7 +142,7 @@ def declare_robot(read: ParameterReader, link: LinkOptions, **given: Any) -> Rob
 
 
 def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
-    """Return whether to go through the vendor's library; nothing is guessed where it is there."""
+    """Return whether to use the vendor's library; if it is installed, the user must choose."""
     installed, wanted = is_installed(), not protocols
     if wanted and not installed:
         raise CommandError(

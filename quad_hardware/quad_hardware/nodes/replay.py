@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware replay``: a serial log as the topics that hardware_node published."""
+"""``ros2 run quad_hardware replay``: publishes a serial log as hardware_node's topics."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ WATCH_PERIOD = 0.5  # [s] between two looks for a hardware_node
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """Parameters of the replay itself."""
+    """Parameters of the replay."""
 
     log: str = switch('', 'file of a black box, or of serial_log of hardware_node (required)')
     rate: float = setting(1.0, 0.01, 100.0, 'how many seconds of the log go by in one')
@@ -79,14 +79,14 @@ robot_description, preset, arm, joints.*, imu.*, odometry.*, odom_frame, publish
 
 
 class Replay:
-    """The node of a log that is replayed."""
+    """Node that replays a serial log."""
 
     def __init__(self, node: Node) -> None:
         """Read the parameters.
 
         Raises:
-            ParameterError: One is misspelt, of another kind or out of its range.
-            HardwareError: There is no log, or parameters do not fit the robot.
+            ParameterError: A parameter is misspelt, of the wrong type or out of range.
+            HardwareError: The log is missing, or parameters do not match the robot.
         """
         self._refusal: Exception | None = None
         self._node = node
@@ -116,13 +116,13 @@ class Replay:
         self._diagnostics_due = 0.0
 
     def play(self, stop: threading.Event) -> None:
-        """Play the log in a thread of its own, and serve the node meanwhile.
+        """Play the log in its own thread while the node spins.
 
         Args:
-            stop: Ends it; set at the end of the log.
+            stop: Ends the replay; set at the end of the log.
 
         Raises:
-            HardwareError: Another node publishes the same meanwhile.
+            HardwareError: Another node publishes the same topics meanwhile.
             PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_robot, stop))
@@ -189,7 +189,7 @@ def _own(node: Node) -> list[str]:
 
 
 def _published_by(node: Node) -> set[str]:
-    """Return the nodes that publish what this one does."""
+    """Return other nodes that publish the same topics."""
     return {f'{node.get_namespace().rstrip("/")}/{RECORDED}', *_own(node)}
 
 
@@ -201,7 +201,7 @@ def _refusal(found: list[str]) -> RecordingError:
 
 
 def _calibrated(path: Path) -> Iterator[tuple[str, object]]:
-    """Yield what a file has of a robot, by the names of parameters."""
+    """Yield the robot calibration in a file, by parameter name."""
     if not path.is_file():
         raise RecordingError(f'calibration: {path}: there is no such file')
     tree = read_parameters(path)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The state of a robot, on a serial line or in the log of one, as ROS topics (REP 103, 105, 145).
+"""Publishes the state of a robot, live or from a log, as ROS topics (REP 103, 105, 145).
 
-What is published with every report comes as a template, which makes the message, and as the
-numbers that change from one message to the next. Standard deviations are None where a value is
-not measured.
+Each message published per report consists of a template and the numbers that change from message
+to message. Standard deviations are None for unmeasured values.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ Numbers = Sequence[float]
 
 
 def joint_states(names: tuple[str, ...], joints: JointSample) -> tuple[MessageTemplate, Numbers]:
-    """Return the joints that are measured, of all joints by name; efforts are not known."""
+    """Return the template for the measured joints, out of all joint names; without efforts."""
     columns = joints.positions, joints.velocities or ()
     if joints.unmeasured:
         names = tuple(joints.measured(names))
@@ -66,11 +65,11 @@ def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
 def imu(
     sample: ImuSample, deviations: Deviations, frame: str, turned: Rotation
 ) -> tuple[MessageTemplate, Numbers]:
-    """Return attitude, angular velocity and specific force; zeros for what is not measured.
+    """Return attitude, angular velocity and specific force; unmeasured ones are zero.
 
     Args:
-        frame: Name of the frame that they are in.
-        turned: Its rotation in base_link, in which the sample is.
+        frame: Name of the frame of the message.
+        turned: Rotation of that frame in base_link, the frame of the sample.
     """
     body = conjugate(turned)
     acceleration = None if sample.acceleration is None else deviations.linear_acceleration_stddev
@@ -144,7 +143,7 @@ def _odometry(
 
 
 def foot_contacts(state: OdometryState) -> tuple[MessageTemplate, Numbers]:
-    """Return which feet are taken to stand."""
+    """Return the estimated foot contacts."""
     return MessageTemplate(_foot_contacts, 0, state.standing), ()
 
 
@@ -154,7 +153,7 @@ def _foot_contacts(stamp: Time, _numbers: Numbers, *contacts: bool) -> FootConta
 
 
 def transforms(state: OdometryState, frames: Frames) -> tuple[MessageTemplate, Numbers]:
-    """Return odom to base_link and base_link to base_footprint, or the other way round."""
+    """Return the transforms odom to base_link to base_footprint, or odom to footprint to base."""
     tilt, place = _level(state.rotation), (state.x, state.y)
     if frames.footprint_mode is FootprintMode.PARENT:
         names = frames.odom_frame, frames.footprint_frame, frames.base_frame
@@ -178,7 +177,7 @@ def _transforms(stamp: Time, numbers: Numbers, odom: str, first: str, second: st
 
 
 def battery(state: RobotState, stamp: Time) -> BatteryState:
-    """Return the charge; what is not reported is NaN, as the message wants it."""
+    """Return the battery state; unreported values are NaN, as the message requires."""
     unknown = math.nan
     return BatteryState(
         header=Header(stamp=stamp),
@@ -208,7 +207,7 @@ def _rate(sample: ImuSample, deviations: Deviations) -> float | None:
 
 
 def _level(rotation: Rotation) -> Rotation:
-    """Return roll and pitch of a rotation, without its yaw."""
+    """Return a rotation's roll and pitch, without its yaw."""
     return multiply(about_z(-yaw_of(rotation)), rotation)
 
 
@@ -248,7 +247,7 @@ WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
 def log_link(node: Node, state: LinkState, detail: str) -> None:
-    """Log how a link is."""
+    """Log a change of the link state."""
     if state in {LinkState.REFUSED, LinkState.FAILED}:
         node.get_logger().error(f'{state.value}: {detail}')
     elif state in {LinkState.STALE, LinkState.CONNECTING}:
@@ -270,7 +269,7 @@ class RobotTopics:
         deviations: Deviations,
         steady: Callable[[float], float] = lambda moment: moment,
     ) -> None:
-        """Make the publishers; ``steady`` turns times of states into the monotonic clock [s]."""
+        """Create the publishers; ``steady`` converts state times to the monotonic clock [s]."""
         self.link = LinkDiagnostic()  # what is said of the serial link
         self._node, self._robot = node, robot
         self._frames, self._deviations = frames, deviations
@@ -292,7 +291,7 @@ class RobotTopics:
         self._velocity_error = node.create_publisher(Float64, 'joint_velocity_error', LATCHED)
 
     def publish(self, state: RobotState) -> None:
-        """Publish a report, in the thread that has it."""
+        """Publish a report from the thread that received it."""
         if state.servo_problem is not None and state.servo_problem != self._servo_problem:
             self._servo_problem = state.servo_problem
             self._servos.publish(String(data=state.servo_problem))
@@ -326,13 +325,13 @@ class RobotTopics:
         recording: Callable[[str], str],
         commands: DiagnosticStatus | None = None,
     ) -> None:
-        """Publish how link and robot are, and the battery.
+        """Publish link and robot diagnostics, and the battery.
 
         Args:
-            name: Name of the node that has the robot.
-            port: Its serial port, or what is in the place of one.
-            recording: Returns the last file of the black box, maybe of one subject.
-            commands: What became of joint commands; None where it is unknown.
+            name: Name of the node.
+            port: Serial port, or the log in its place.
+            recording: Returns the last black box file, optionally for one subject.
+            commands: Counters of joint commands; None if unknown.
         """
         state, status = self._robot.latest, self._robot.status()
         now = self._node.get_clock().now().to_msg()
@@ -352,6 +351,6 @@ class RobotTopics:
         self._diagnostics.publish(array)
 
     def _stamp(self, moment: float) -> int:
-        """Return a time of the robot's states on the clock of ROS [ns]."""
+        """Convert a state time of the robot to ROS time [ns]."""
         age = round((time.monotonic() - self._steady(moment)) * 1e9)
         return max(self._node.get_clock().now().nanoseconds - age, 0)

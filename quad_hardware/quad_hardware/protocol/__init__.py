@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""The serial protocols of the XGO: one table each, codecs and a stream parser for both sides.
+r"""Serial protocols of the XGO: tables, codecs, and a stream parser for either side.
 
 The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read these tables::
 

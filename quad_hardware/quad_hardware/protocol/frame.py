@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What tables of serial protocols are made of, and frames: as values, as bytes, found in a stream.
+"""Building blocks of protocol tables; encoding, decoding and parsing of frames.
 
-Encoder, decoder, simulated robot and the protocol page all read the same table, so that a change
-of the layout is a change of one row. A stream may hold anything.
+Encoder, decoder, simulated robot and protocol page all read the same table, so a layout change is
+a change of one row. The parser accepts arbitrary input.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..exceptions import CodecError
 
 
 class Kind(IntEnum):
-    """What a frame is for: its TYPE byte."""
+    """Purpose of a frame: its TYPE byte."""
 
     WRITE = 0x00  # host to robot, not answered; what the developer firmware pushes, too
     READ = 0x02  # host to robot
@@ -33,7 +33,7 @@ ROBOT_KINDS = frozenset({Kind.REPLY, Kind.NACK, Kind.PUSH})  # what a robot send
 
 
 class Scalar(Enum):
-    """Number formats on the wire, as :mod:`struct` writes them."""
+    """Number formats on the wire, in :mod:`struct` notation."""
 
     U8 = '<B'
     U16 = '<H'
@@ -50,7 +50,7 @@ class Scalar(Enum):
 
 
 class Access(Flag):
-    """Which kinds of frame may carry a function."""
+    """Frame kinds that may carry a function."""
 
     READ = 1
     WRITE = 2
@@ -58,7 +58,7 @@ class Access(Flag):
 
 
 class Model(Enum):
-    """Kinds of robot, which differ in the ranges that scale their bytes."""
+    """Robot models, which differ in the ranges that scale their bytes."""
 
     MINI = 'mini'
     LITE = 'lite'
@@ -67,13 +67,13 @@ class Model(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Range of a quantity that a byte 0 to 255 spreads over."""
+    """Range of a quantity that a byte 0 to 255 covers."""
 
     low: float  # value of byte 0
     high: float  # value of byte 255
 
     def encode(self, value: float) -> int:
-        """Return the nearest byte; values outside are taken to the nearer end.
+        """Return the nearest byte; clamp values outside of the range.
 
         Raises:
             CodecError: The value is not finite.
@@ -90,7 +90,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A run of equal numbers in a payload."""
+    """A sequence of equally formatted numbers in a payload."""
 
     name: str  # key in what :meth:`Function.unpack` returns
     scalar: Scalar  # number format
@@ -102,14 +102,14 @@ class Field:
 
     @property
     def size(self) -> int:
-        """Size of the whole run [B]."""
+        """Size of the whole sequence [B]."""
         return self.scalar.size * self.count
 
     def steps(self, values: Iterable[float]) -> tuple[float, ...]:
-        """Return values of one run or more as the numbers on the wire.
+        """Convert the values of one or more sequences to the numbers on the wire.
 
         Raises:
-            CodecError: A wrong number of values.
+            CodecError: The number of values is wrong.
         """
         numbers = tuple(values)
         if not numbers or len(numbers) % self.count:
@@ -119,7 +119,7 @@ class Field:
         return tuple(round(value / self.scale) for value in numbers)
 
     def scaled(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
-        """Return numbers of the wire in the unit of the value."""
+        """Convert numbers on the wire to values in their unit."""
         return numbers if self.scale == 1.0 else tuple(n * self.scale for n in numbers)
 
 
@@ -146,7 +146,7 @@ class Function:
     layout: str = field(init=False)
 
     def __post_init__(self) -> None:
-        """Add up the length and the format once: states come and targets go 50 times a second."""
+        """Precompute length and format: states and targets are coded 50 times a second."""
         layout, end = '', 0
         for part in self.fields:
             if part.offset < end:
@@ -160,13 +160,13 @@ class Function:
         object.__setattr__(self, 'layout', f'{layout}{length - end}x')
 
     def accepts(self, length: int) -> bool:
-        """Return whether a payload may have a length [B]."""
+        """Return whether a payload may have this length [B]."""
         if self.repeated:
             return length > 0 and length % self.length == 0
         return 0 < length <= self.length if self.variable else length == self.length
 
     def pack(self, **values: Iterable[float]) -> bytes:
-        """Encode a payload; of repeated fields, each has the values of all groups.
+        """Encode a payload; each repeated field has the values of all groups.
 
         Raises:
             CodecError: A field is missing or unknown, or its values do not fit.
@@ -192,7 +192,7 @@ class Function:
             raise CodecError(f'{self.name}: {given} do not fit its fields') from error
 
     def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
-        """Decode a payload; a repeated field has the values of all groups in one tuple.
+        """Decode a payload; each repeated field has the values of all groups in one tuple.
 
         Raises:
             CodecError: The function has no payload of this length.
@@ -210,7 +210,7 @@ class Function:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Protocol:
-    """A serial protocol: its envelope and its table.
+    """A serial protocol: frame format and function table.
 
     Every frame is ``55 00 | LEN | TYPE | address | payload | CHK | 00 AA``; LEN counts the whole
     frame, CHK is 255 minus the sum of everything from LEN to the payload, modulo 256.
@@ -227,16 +227,16 @@ class Protocol:
 
     @property
     def overhead(self) -> int:
-        """Bytes of a frame without payload [B]."""
+        """Size of a frame without payload [B]."""
         return 7 + self.address_size
 
     def wire_time(self, length: int) -> float:
-        """Return how long that many bytes take on the line [s]: ten bits each in 8N1."""
+        """Return how long this many bytes take on the line [s]: ten bits each in 8N1."""
         return length * 10 / self.baud
 
 
 def table(*rows: Function) -> dict[int, Function]:
-    """Return rows by address.
+    """Index rows by address.
 
     Raises:
         ValueError: Two rows have the same address or name.
@@ -264,8 +264,8 @@ class Frame:
         """Return the bytes on the wire.
 
         Raises:
-            CodecError: The payload is too long, the address too large, or the protocol has no
-                such kind of frame.
+            CodecError: The payload is too long, the address too large, or the protocol lacks
+                this kind of frame.
         """
         length = protocol.overhead + len(self.payload)
         if length > protocol.max_length:
@@ -286,7 +286,7 @@ class Frame:
 
 
 def checksum(body: bytes | bytearray | memoryview) -> int:
-    """Return the checksum of what stands between header and checksum."""
+    """Return the checksum of the bytes between header and checksum."""
     return 255 - sum(body) % 256
 
 
@@ -295,7 +295,7 @@ _AFTER_CHECKSUM = len(TAIL) + 1
 
 @dataclass(slots=True)
 class ParserCounters:
-    """What a parser has seen since its start."""
+    """Counters of a parser since its start."""
 
     bytes: int = 0  # bytes fed
     frames: int = 0  # valid frames
@@ -306,20 +306,20 @@ class ParserCounters:
 
     @property
     def damaged(self) -> int:
-        """Candidates that looked like a frame and were none."""
+        """Number of candidates that looked like a frame but were invalid."""
         return self.bad_tail + self.bad_checksum
 
 
 class StreamParser:
     """Yields the valid frames of a byte stream, in order.
 
-    A candidate that is no valid frame costs one byte: the search goes on at its second byte, so
-    that a frame that begins inside a damaged one is found. The buffer never holds more than one
-    incomplete frame after a call.
+    After an invalid candidate, the search continues at its second byte, so that a frame that
+    begins inside a damaged one is found. The buffer never holds more than one incomplete frame
+    after a call.
     """
 
     def __init__(self, protocol: Protocol, kinds: frozenset[Kind]) -> None:
-        """Begin with an empty buffer; the other side sends ``ROBOT_KINDS`` or ``HOST_KINDS``."""
+        """Start with an empty buffer; the peer sends ``ROBOT_KINDS`` or ``HOST_KINDS``."""
         self._protocol = protocol
         # the developer firmware has one kind, for both directions
         self._kinds = {int(kind): kind for kind in kinds & protocol.kinds or protocol.kinds}
@@ -330,20 +330,20 @@ class StreamParser:
 
     @property
     def pending(self) -> int:
-        """Bytes that wait for the rest of their frame."""
+        """Number of buffered bytes of an incomplete frame."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Parse bytes; return the frames that they complete."""
+        """Parse bytes; return the completed frames."""
         self.counters.bytes += len(data)
         self._buffer += data
         return self._scan(more_comes=True)
 
     def expire(self) -> list[Frame]:
-        """Stop waiting for the rest of a frame, and search for frames behind its header.
+        """Abandon an incomplete frame, and search for frames behind its header.
 
-        To be called when the line was quiet for longer than a pause inside a frame can be: three
-        bytes of noise may look like the start of a long frame and would hold back a short one.
+        Call it after the line was quiet for longer than any pause inside a frame: three bytes of
+        noise may look like the start of a long frame and would delay a short one.
         """
         return self._scan(more_comes=False)
 
@@ -372,7 +372,7 @@ class StreamParser:
         return frames
 
     def _frame_length(self, start: int) -> int | None:
-        """Return the length of the frame behind a header; 0 for none, None while incomplete."""
+        """Return the length of the frame after a header; 0 for none, None if incomplete."""
         buffer, counters = self._buffer, self.counters
         available = len(buffer) - start
         if available <= LENGTH_AT:

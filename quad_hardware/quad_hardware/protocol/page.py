@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware protocol``: the tables of the protocols as a page of Markdown."""
+"""``ros2 run quad_hardware protocol``: prints the protocol tables as Markdown."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servos, and the tables of the protocols.
+"""Servo ids and protocol tables.
 
 The id of a servo is ``10 * leg + joint``: legs count 1 left front, 2 right front, 3 right rear,
 4 left rear; joints 1 calf, 2 thigh, 3 hip, which is the reverse of the order in a URDF. 51 is the
@@ -8,16 +8,16 @@ gripper, 52 to 54 are the arm from the elbow to its yaw. Sources: the vendor's L
 (robot_tools), its Python library and the limits in its micro:bit library.
 
 v1, one-byte registers at 115200 baud, is public: the vendor's serial protocol page and its Python
-libraries (XGO-PythonLib 1.0.0, xgolib 1.1.5). A register is a function code and no memory cell:
-0x62 answers four bytes, 0x63 four others. Writes of several bytes do run through consecutive
-codes. Numbers of several bytes are little-endian in 0x62 to 0x65 and big-endian elsewhere.
+libraries (XGO-PythonLib 1.0.0, xgolib 1.1.5). A register is a function code, not a memory cell:
+0x62 answers four bytes, 0x63 four others. Multi-byte writes do run through consecutive codes.
+Numbers of several bytes are little-endian in 0x62 to 0x65 and big-endian elsewhere.
 
 v2, main and sub codes and states pushed at 50 Hz, at 2 Mbaud, is OUR ASSUMPTION. The vendor has
 not published this layout. What is stated about it: header and tail, a checksum, main and sub
 codes, a state frame of 254 bytes about 50 times a second, the valid attitude ``euler2`` at offsets
 20 to 31, 16 joint angles [deg] and 16 joint velocities [deg/s], battery, acceleration of about 9.8
-at rest, no raw gyro and no gravity. Everything else here is chosen so that all of that holds; when
-the vendor's table is known, this file is what changes. Numbers are little-endian.
+at rest, no raw gyro and no gravity. Everything else here is chosen to agree with that; once the
+vendor's table is known, only this file changes. Numbers are little-endian.
 
 ``developer`` is the firmware for developers of the XGO-Mini, by the vendor's page "Develop mode"
 (https://www.xgorobot.com/XgoWiki-en/wiki/1%20XGO-Mini/For%20XGO%20developer/Develop%20mode/): 1
@@ -76,10 +76,10 @@ ANGLE_SPANS: Mapping[Model, Mapping[int, Span]] = MappingProxyType(
 
 
 def slot_of(motor: int) -> int:
-    """Return where a motor stands in :data:`MOTOR_ORDER`.
+    """Return the index of a motor in :data:`MOTOR_ORDER`.
 
     Raises:
-        ValueError: There is no such motor; the message names those that there are.
+        ValueError: The motor is unknown; the message lists the known ones.
     """
     try:
         return _SLOT[motor]
@@ -107,7 +107,7 @@ class Code(IntEnum):
 
 
 class Refusal(IntEnum):
-    """Reasons in the payload of a NACK."""
+    """Reason codes in the payload of a NACK."""
 
     UNKNOWN_FUNCTION = 1
     WRONG_LENGTH = 2
@@ -213,7 +213,7 @@ RATE_STEP = 1 / 16.4  # [deg/s]
 
 
 class Register(IntEnum):
-    """Codes that the driver uses by name."""
+    """Register codes that the driver uses by name."""
 
     BATTERY = 0x01
     FIRMWARE = 0x07
@@ -229,7 +229,7 @@ class Register(IntEnum):
 
 
 class Torque(IntEnum):
-    """Values of register 0x20; a leg (1 to 4, 5 the arm) is added to the last two."""
+    """Values of register 0x20; the last two are added to a leg number (1 to 4, 5 the arm)."""
 
     UNLOAD_ALL = 0x01
     LOAD_ALL = 0x00
@@ -248,7 +248,7 @@ REGISTER_OF_MOTOR: Mapping[int, int] = {m: r for r, m in MOTOR_OF_REGISTER.items
 
 
 def _spans(mini: tuple[float, float], lite: tuple[float, float] | None = None) -> Spans:
-    """Return ranges by model; mini2SW and mini3W are taken to have those of the mini."""
+    """Return ranges by model; mini2SW and mini3W are assumed to equal the mini."""
     low, high = Span(*mini), Span(*(lite or mini))
     return {Model.MINI: low, Model.LITE: high, Model.WHEELED: low}
 
@@ -400,12 +400,12 @@ DEVELOPER_FIRMWARE = 'M developer'  # as we call it: it names no version, and is
 
 
 def swap_floats(pushed: bytes) -> bytes:
-    """Return what the developer firmware pushes with its floats in the other byte order."""
+    """Swap the byte order of the floats in a developer firmware frame."""
     return b''.join(pushed[at : at + 4][::-1] for at in (0, 4, 8)) + pushed[12:]
 
 
 def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Split a write of several bytes into the registers that it runs through.
+    """Split a multi-byte write into single registers.
 
     Yields:
         Register and its bytes; a register that the table lacks takes one byte.
@@ -420,7 +420,7 @@ def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def model_of_firmware(firmware: str) -> Model | None:
-    """Return the model that a firmware version names by its first letters, None if unknown."""
+    """Return the model from the prefix of a firmware version; None if unknown."""
     if firmware.startswith(('MW', 'W')):
         return Model.WHEELED
     return {'M': Model.MINI, 'L': Model.LITE}.get(firmware[:1])

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in physics as a Gymnasium environment; importing it registers it.
+"""The robot in physics as a Gymnasium environment, registered on import.
 
-``quad_sim/Walk-v0`` is to walk as commanded.
+The task of ``quad_sim/Walk-v0`` is to walk as commanded.
 
-Many at once, spread over the cores::
+Vectorized over the cores::
 
     import gymnasium
     import quad_sim.env

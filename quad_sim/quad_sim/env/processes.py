@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Many environments at once: several in each of a few processes, with numbers in shared memory.
+"""Vectorized environments: several in each of a few processes, data in shared memory.
 
-Gymnasium's own gives each environment a process; more of them than cores wait for each other, and
-every step of each costs two messages. Here a step of all costs two messages for each process.
+Gymnasium's AsyncVectorEnv starts one process per environment: with more than there are cores, they
+wait for each other, and each step costs two messages per environment. Here it is two per process.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ _Memory = tuple[Any, np.dtype[np.void]]
 
 
 def _row(observation: int, action: int) -> np.dtype[np.void]:
-    """Return what a row has, for observations and actions of so many numbers."""
+    """Return the data of a row, for given numbers of observations and actions."""
     numbers = [('observations', 'f4', (observation,)), ('actions', 'f4', (action,))]
     ends = [('rewards', 'f4'), ('terminated', '?'), ('truncated', '?')]
     return np.dtype([*numbers, *ends], align=True)
 
 
 class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
-    """Environments in processes; one that ends begins anew in the same step.
+    """Environments in processes; a finished episode restarts in the same step.
 
-    The last observation and the infos of an episode
-    that ended are in ``infos['final_obs']`` and ``infos['final_info']``.
+    The final observation and infos of an episode are in ``infos['final_obs']`` and
+    ``infos['final_info']``.
     """
 
     def __init__(
@@ -61,13 +61,13 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """Start the processes.
 
         Args:
-            make: Makes an environment whose observations and actions are rows of numbers; a
-                function that other processes can import.
-            processes: In how many processes; as many as there are cores for None.
+            make: Creates an environment whose observations and actions are rows of numbers; other
+                processes must be able to import it.
+            processes: Number of processes; None for the number of cores.
 
         Raises:
-            SetupError: There are fewer environments than processes, or no rows of numbers.
-            SimulationError: An environment cannot be made.
+            SetupError: There are fewer environments than processes, or rows are not numeric.
+            SimulationError: An environment cannot be created.
         """
         workers = min(len(os.sched_getaffinity(0)), num_envs) if processes is None else processes
         if not 1 <= workers <= num_envs:
@@ -100,7 +100,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def reset(
         self, *, seed: Seed = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode in all of them; seeds go up by one from the first, or are a list."""
+        """Begin an episode in all environments; seeds count up from the first, or are a list."""
         if not isinstance(seed, list):
             seed = [None if seed is None else seed + index for index in range(self.num_envs)]
         for worker in self._workers:
@@ -111,10 +111,10 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def step(
         self, actions: Floats
     ) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Pass a step in all of them.
+        """Advance all environments by one step.
 
         Raises:
-            SimulationError: One of them failed, or a process died.
+            SimulationError: An environment failed, or a process died.
         """
         self._rows['actions'][:] = actions
         for worker in self._workers:
@@ -125,20 +125,20 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         return observations, rewards, fallen, over, infos
 
     def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:  # noqa: ANN401
-        """Call a method of each of them; return what they return."""
+        """Call a method of each environment; return the results."""
         for worker in self._workers:
             worker.order('call', name, arguments, keywords)
         return tuple(answer for _, answer in self._answers())
 
     def close_extras(self, **_keywords: Any) -> None:  # noqa: ANN401
-        """End the processes."""
+        """Stop the processes."""
         for worker in self._workers:
             worker.hang_up()
         for worker in self._workers:
             worker.join()
 
     def _answers(self) -> list[tuple[int, Any]]:
-        """Wait for all processes; return index and answer of those environments that have one."""
+        """Wait for all processes; yield index and answer of environments that have one."""
         answers = [worker.answer() for worker in self._workers]
         for answer in answers:
             if isinstance(answer, str):
@@ -153,7 +153,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
 
 
 def walking_processes(num_envs: int = 1, **keywords: Any) -> ProcessVectorEnv:  # noqa: ANN401
-    """Make many robots that are to walk, with keywords of :class:`.walking.WalkingEnv`."""
+    """Create vectorized walking environments, with keywords of :class:`.walking.WalkingEnv`."""
     return ProcessVectorEnv(partial(WalkingEnv, **keywords), num_envs)
 
 
@@ -161,7 +161,7 @@ Answer = list[tuple[int, Any]] | str
 
 
 class _Worker:
-    """A process as the one that started it sees it."""
+    """Parent's handle of a worker process."""
 
     def __init__(self, make: Callable[[], Env], memory: _Memory, indices: range) -> None:
         # a process that is forked would have locks of threads that it does not have
@@ -175,14 +175,14 @@ class _Worker:
         theirs.close()
 
     def order(self, order: str, *arguments: object) -> None:
-        """Send a request; the answer is to be fetched."""
+        """Send a request; :meth:`answer` returns the result."""
         try:
             self._pipe.send((order, arguments))
         except OSError as error:
             raise SimulationError(f'a process of environments has died: {error}') from error
 
     def answer(self) -> Answer:
-        """Wait for the answer; it is text when something failed."""
+        """Wait for the answer; on failure, it is an error text."""
         try:
             answer: Answer = self._pipe.recv()
         except (EOFError, OSError):
@@ -201,7 +201,7 @@ class _Worker:
 
 
 def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: range) -> None:
-    """Do what is asked for until the other end of the pipe is closed."""
+    """Serve requests until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
     batch = _Batch(np.frombuffer(*memory), indices)
     try:
@@ -219,7 +219,7 @@ def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: 
 
 
 class _Batch:
-    """The environments of a process."""
+    """The environments of one process."""
 
     def __init__(self, rows: Rows, indices: range) -> None:
         self._rows, self._indices = rows, indices

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Walking as commanded: the environment, another robot in each episode, and what a step is worth.
+"""The walking environment: commanded velocities, randomized robots, reward.
 
 The terms of the reward are as in legged_gym (Rudin et al., 2022).
 """
@@ -39,7 +39,7 @@ from ..state import Array, BOARD, FLAT, Noise, NONE, Terrain
 
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
-    """Weights of the terms of a second, of which a step has its part; a fall counts once."""
+    """Weights of the reward terms per second, scaled by the step duration; a fall counts once."""
 
     tracking: float = 2.0  # exp(-(error / tracking_width)^2) of the linear velocity
     turning: float = 1.0  # exp(-(error / turning_width)^2) of the turning
@@ -55,7 +55,7 @@ class RewardWeights:
     turning_width: float = 0.4  # [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse numbers of which no reward can be made."""
+        """Reject invalid numbers."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not math.isfinite(value) or (field.name.endswith('_width') and value <= 0.0):
@@ -64,11 +64,11 @@ class RewardWeights:
     def terms(
         self, robot: Robot, target_speed: Array, error: Vector, period: float, *, fallen: bool
     ) -> dict[str, float]:
-        """Return what each term is worth in one step.
+        """Return the value of each term for one step.
 
         Args:
-            target_speed: That of the targets since the step before in [rad/s].
-            error: As of :class:`WalkingEnv`.
+            target_speed: Speed of the targets since the previous step in [rad/s].
+            error: See :class:`WalkingEnv`.
         """
         velocity, down = robot.base_velocity, down_in_body(robot.base_pose.orientation)
         (_, _, up), (roll, pitch, _) = velocity.linear, velocity.angular
@@ -108,10 +108,10 @@ _FIXED = {'kick_interval', 'noise'}  # no ranges
 
 
 def check_range(name: str, span: Range) -> None:
-    """Refuse what is not two finite numbers, the lower one first.
+    """Reject anything but two finite numbers, the lower one first.
 
     Raises:
-        SetupError: With the name.
+        SetupError: The range is invalid; the message gives its name.
     """
     if len(span) != 2 or not -math.inf < span[0] <= span[1] < math.inf:
         raise SetupError(f'{name} {span}: give two finite numbers, the lower one first')
@@ -119,7 +119,7 @@ def check_range(name: str, span: Range) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Randomization:
-    """Ranges from which each episode draws, all alike likely."""
+    """Ranges from which each episode samples uniformly."""
 
     friction: Range = (0.4, 1.3)  # under the feet
     trunk_mass: Range = (0.9, 1.25)  # factor of the mass of the trunk
@@ -136,7 +136,7 @@ class Randomization:
     noise: Noise = BOARD  # of the sensors
 
     def __post_init__(self) -> None:
-        """Refuse what nothing can be drawn from."""
+        """Reject invalid ranges."""
         for field in fields(self):
             if field.name not in _FIXED:
                 check_range(field.name, getattr(self, field.name))
@@ -146,16 +146,16 @@ class Randomization:
             raise SetupError(f'kick_interval {self.kick_interval} s: give 0 or a finite time')
 
     def variation(self, random: np.random.Generator) -> Variation:
-        """Draw a robot and its ground."""
+        """Sample a variation of robot and ground."""
         drawn = {name: float(random.uniform(*getattr(self, name))) for name in _VARIED}
         softest, stiffest = map(math.log, self.stiffness)
         return Variation(**drawn | {'stiffness': math.exp(random.uniform(softest, stiffest))})
 
     def scaled(self, share: float) -> Randomization:
-        """Return ranges that are nearer to the robot as it is; kicks are weaker. Noise stays.
+        """Shrink the ranges towards the nominal robot, and weaken kicks; noise is unchanged.
 
         Args:
-            share: 0 for the robot as it is, 1 for these ranges.
+            share: 0 for the nominal robot, 1 for these ranges.
 
         Raises:
             SetupError: The share is not from 0 to 1.
@@ -200,7 +200,7 @@ Floats = NDArray[np.float32]
 
 
 class Observation(Enum):
-    """Parts of an observation in their order: what it is, and how many numbers (0: a joint)."""
+    """Parts of an observation in order: content and number of values (0: one per joint)."""
 
     ANGULAR_VELOCITY = ('of base_link in its own frame in [rad/s]', 3)
     DOWN = ('direction of gravity in base_link', 3)
@@ -210,13 +210,13 @@ class Observation(Enum):
     ACTION = ('of the step before in [rad]', 0)
 
     def width(self, joints: int) -> int:
-        """Return how many numbers it has."""
+        """Return the number of values."""
         return self.value[1] or joints
 
 
 @dataclass(frozen=True, slots=True)
 class CommandRanges:
-    """Velocities that are commanded."""
+    """Ranges of commanded velocities."""
 
     x: Range = (-0.35, 0.35)  # ahead in [m/s]
     y: Range = (-0.15, 0.15)  # to the left in [m/s]
@@ -226,7 +226,7 @@ class CommandRanges:
     straight: float = 0.4  # share of the others along one axis only
 
     def __post_init__(self) -> None:
-        """Refuse what nothing can be drawn from."""
+        """Reject invalid ranges."""
         for name in ('x', 'y', 'yaw'):
             check_range(name, getattr(self, name))
         if not 0.0 < self.time < math.inf:
@@ -235,7 +235,7 @@ class CommandRanges:
             raise SetupError(f'rest {self.rest}, straight {self.straight}: give parts of 0 to 1')
 
     def draw(self, random: np.random.Generator) -> Vector:
-        """Draw a command."""
+        """Sample a command."""
         if random.random() < self.rest:
             return 0.0, 0.0, 0.0
         parts = np.array([random.uniform(*span) for span in (self.x, self.y, self.yaw)])
@@ -246,21 +246,21 @@ class CommandRanges:
 
 
 class WalkingEnv(gymnasium.Env[Floats, Floats]):
-    """A quadruped that is to walk as commanded.
+    """A quadruped whose task is to walk as commanded.
 
-    An action is how far the targets of the joints are from a robot that stands in [rad]. Robot,
-    servos and sensors are those of the simulation; they differ in each episode, by ranges that
-    are data. An episode is terminated by a fall, and truncated after its time.
+    An action is the offset of the joint targets from the standing pose in [rad]. Robot, servos and
+    sensors are randomized in each episode, within configurable ranges. A fall terminates an
+    episode; its time limit truncates it.
 
     Attributes:
         robot: The robot in physics.
-        period: Time of a step in [s].
-        command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
-        stand: Joint positions of a robot that stands in [rad].
-        state: What its sensors measured last.
-        error: How far its velocity was from the commanded one in the last 0.4 s, a step counts
-            less the older it is: ahead and to the left in [m/s], turning in [rad/s].
-        variation: How the robot and its ground differ in this episode.
+        period: Duration of a step in [s].
+        command: Commanded velocity: forward and left in [m/s], turning in [rad/s].
+        stand: Joint positions of the standing robot in [rad].
+        state: Last sensor values.
+        error: Velocity error, exponentially averaged over about 0.4 s: forward and left in [m/s],
+            turning in [rad/s].
+        variation: Variation of robot and ground in this episode.
     """
 
     def __init__(
@@ -279,13 +279,13 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         """Put the robot on the ground.
 
         Args:
-            terrain: The ground; the robot begins on a level part of it.
-            duration: Longest time of an episode in [s].
-            timestep: Of the integration in [s].
+            terrain: The ground; the robot starts on a level part of it.
+            duration: Time limit of an episode in [s].
+            timestep: Integration time step in [s].
 
         Raises:
-            SetupError: A time is not above 0.
-            DescriptionError: There is no such preset.
+            SetupError: A time is not positive.
+            DescriptionError: The preset is unknown.
         """
         if not (0.0 < period < math.inf and period <= duration < math.inf):
             raise SetupError(
@@ -315,29 +315,28 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Stand on the ground again, as another robot of the ranges.
+        """Reset to standing, with a newly sampled robot.
 
         Args:
-            seed: Of all that is drawn from now on.
-            options: ``command``: three numbers that are commanded in all of this episode.
+            seed: Seed of all following samples.
+            options: ``command``: a constant command of three numbers for this episode.
 
         Raises:
-            SetupError: The command is not three finite numbers, or there is another option.
+            SetupError: The command is not three finite numbers, or an option is unknown.
         """
         super().reset(seed=seed)
         self._begin(_lasting_command(options or {}))
         return self._observation(), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Send joint targets, and let a period pass.
+        """Send joint targets and advance by one period.
 
         Args:
-            action: From the joints of a robot that stands in [rad]; what leads beyond a limit is
-                taken to the limit.
+            action: Offsets from the standing pose in [rad]; targets are clamped to the limits.
 
         Raises:
-            TargetError: A number is not finite, or there are too many or few.
-            SimulationError: The physics blew up.
+            TargetError: A value is not finite, or the count is wrong.
+            SimulationError: The simulation became unstable.
         """
         outcome = self.advance(action)
         return self._observation(), *outcome
@@ -345,10 +344,10 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
     def advance(
         self, action: Floats, wanted: Vector | None = None
     ) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Do what :meth:`step` does, for those who observe :attr:`state` themselves.
+        """Do the work of :meth:`step` without an observation; callers read :attr:`state`.
 
         Args:
-            wanted: Velocity that is judged, where it is not the command at once.
+            wanted: Reference velocity of the reward, if it is not the command.
         """
         speed = self._move(np.asarray(action, np.float32))
         self._judge(wanted or self.command)
@@ -374,7 +373,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self.error = x, y, yaw
 
     def vary(self, randomization: Randomization) -> None:
-        """Change the ranges from the next episode on; noise stays as it was made."""
+        """Use other ranges from the next episode on; noise stays as created."""
         self._randomization = randomization
 
     def _begin(self, command: Vector | None) -> None:
@@ -394,7 +393,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self._steps, self._sums = 0, dict.fromkeys(self._weights.names, 0.0)
 
     def _move(self, wanted: Floats) -> Array:
-        """Send targets, let a period pass, and sense; return the targets' speed [rad/s]."""
+        """Send targets, advance by one period, and measure; return the targets' speed [rad/s]."""
         if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
             raise TargetError(
                 f'action {wanted}: give a finite number for each of {len(self.stand)} joints'

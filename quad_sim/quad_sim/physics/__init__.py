@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in MuJoCo; the only part of the simulation that needs it."""
+"""The robot in MuJoCo; no other part of the simulation needs MuJoCo."""
 
 from .backend import ImuBias, Meter, Metered, PhysicsBackend
 from .model import Variation

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in physics as a back end, in virtual time."""
+"""Back end with the robot in physics, in virtual time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SATURATED = 0.98  # share of a limit from which on a servo is at it
 
 @dataclass(frozen=True, slots=True)
 class Metered:
-    """What a robot did in some time; one time and another one make a sum."""
+    """Statistics of a robot over a time span; spans can be added."""
 
     time: float = 0.0  # how long in [s]
     x: float = 0.0  # way ahead, in the robot's own frame, in [m]
@@ -34,7 +34,7 @@ class Metered:
     speed_time: float = 0.0  # with a joint at its largest speed, mean of all, in [s]
 
     def __add__(self, other: Metered) -> Metered:
-        """Return both together."""
+        """Merge two time spans."""
         both = {
             each.name: (getattr(self, each.name), getattr(other, each.name))
             for each in fields(self)
@@ -44,20 +44,20 @@ class Metered:
 
     @property
     def torque_saturation(self) -> float:
-        """Share of the time that a servo is at its largest torque, mean of all."""
+        """Fraction of time with a servo at its torque limit, mean of all."""
         return self.torque_time / self.time if self.time else 0.0
 
     @property
     def speed_saturation(self) -> float:
-        """Share of the time that a joint is at its largest speed, mean of all."""
+        """Fraction of time with a joint at its speed limit, mean of all."""
         return self.speed_time / self.time if self.time else 0.0
 
 
 class Meter:
-    """Adds up what a robot does between two calls of :meth:`sample`, 20 ms apart or less."""
+    """Accumulates statistics between calls of :meth:`sample`, at most 20 ms apart."""
 
     def __init__(self, robot: Robot, urdf: str) -> None:
-        """Begin now."""
+        """Start now."""
         limits = [joint.limits for joint in movable_joints(urdf)]
         self._efforts = np.array([each.effort for each in limits])
         self._speeds = np.array([each.velocity for each in limits])
@@ -65,7 +65,7 @@ class Meter:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew; also after a reset of the robot."""
+        """Restart; also required after a reset of the robot."""
         self._time, self._pose = self._robot.time, self._robot.base_pose
         self._sum = Metered(weight=9.81 * self._robot.mass)
 
@@ -91,7 +91,7 @@ class Meter:
         )
 
     def read(self) -> Metered:
-        """Return what came together since :meth:`begin`."""
+        """Return the statistics since :meth:`begin`."""
         return self._sum
 
 
@@ -100,24 +100,24 @@ PERIOD = 0.02  # [s]
 
 @dataclass(frozen=True, slots=True)
 class ImuBias:
-    """By how much an IMU is off all the time."""
+    """Constant errors of an IMU."""
 
     gyro: Vector = (0.0, 0.0, 0.0)  # of each axis of the gyro in [rad/s]
     roll: float = 0.0  # of the measured attitude in [rad]
     pitch: float = 0.0  # of the measured attitude in [rad]
 
     def orientation(self, roll: float, pitch: float, yaw: float) -> Quaternion:
-        """Return what is measured of an attitude [rad]."""
+        """Return the measured attitude for a true one [rad]."""
         return from_rpy(roll + self.roll, pitch + self.pitch, yaw)
 
     def rates(self, angular_velocity: Vector) -> Vector:
-        """Return what is measured of an angular velocity [rad/s]."""
+        """Return the measured angular velocity for a true one [rad/s]."""
         x, y, z = (a + b for a, b in zip(angular_velocity, self.gyro, strict=True))
         return x, y, z
 
 
 class PhysicsBackend(Backend):
-    """Has a robot followed by ideal sensors: no noise, and its position is known."""
+    """Simulated robot with ideal sensors: no noise, known position."""
 
     def __init__(
         self,
@@ -125,20 +125,20 @@ class PhysicsBackend(Backend):
         period: float = PERIOD,
         watch: Callable[[], None] = lambda: None,
     ) -> None:
-        """Observe a robot; ``watch`` is called after each step."""
+        """Use a robot; ``watch`` is called after each step."""
         self.robot, self.period, self._watch = robot, period, watch
         self.names = robot.joint_names
 
     def reset(self) -> RobotState:
-        """Stand on the ground again."""
+        """Reset the robot to standing."""
         self.robot.reset()
         return self.observe()
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
-        """Send targets, and let a period pass.
+        """Send targets and advance by one period.
 
         Raises:
-            SimulationError: A target is not finite, or the physics blew up.
+            SimulationError: A target is not finite, or the simulation became unstable.
         """
         if targets is not None:
             self.robot.set_targets(targets)
@@ -161,4 +161,4 @@ class PhysicsBackend(Backend):
         )
 
     def close(self) -> None:
-        """Do nothing: the robot is memory."""
+        """Do nothing: the robot holds no resources."""

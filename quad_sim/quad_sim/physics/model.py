@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A MuJoCo model from the robot's URDF: free base, floor, servos, sensors; its IMU and variations.
+"""Builds a MuJoCo model from the robot's URDF: free base, floor, servos, IMU, variations.
 
-All parts of the robot touch the floor. Its legs touch each other and the trunk; the parts of one
-leg, which its joint limits keep apart, and an arm touch nothing of the robot.
+All parts of the robot collide with the floor. The legs collide with each other and the trunk.
+Parts of one leg, which the joint limits keep apart, do not collide, nor does an arm with the
+robot.
 """
 
 from __future__ import annotations
@@ -45,24 +46,24 @@ _SUNK = 0.005  # [m] ground without bumps lies below the plane, or two floors wo
 
 
 def _pass_over(_text: str) -> None:
-    """Ignore a warning of MuJoCo: its counters are read."""
+    """Ignore a MuJoCo warning: its counters are checked instead."""
 
 
 def build_model(
     urdf: str, servo: ServoParameters, terrain: Terrain, timestep: float, *, held: bool = False
 ) -> mujoco.MjModel:
-    """Make the model.
+    """Build the model.
 
     Args:
         urdf: The robot, with base_link as root, imu_link and feet.
-        timestep: Of the integration [s].
-        held: The trunk stays where it is, in the air.
+        timestep: Integration time step [s].
+        held: Fix the trunk in the air.
 
     Returns:
         A model whose actuators are the movable joints in the order of the URDF.
 
     Raises:
-        SetupError: The URDF is no such robot.
+        SetupError: The URDF does not describe such a robot.
     """
     return _compiled(urdf, servo, terrain, timestep, held=held)[1]
 
@@ -73,14 +74,14 @@ def mjcf(
     """Return the robot as MJCF, for trainers that simulate it themselves (mjlab, Playground).
 
     Args:
-        urdf: The robot, as for :func:`build_model`.
-        servo: What drives its hinges, but for the interpolation: a trainer sets targets itself.
-        timestep: Of the integration [s].
+        urdf: The robot, see :func:`build_model`.
+        servo: Servo of its hinges, without interpolation: a trainer sets targets itself.
+        timestep: Integration time step [s].
         start: Position of base_link [m], its orientation (w, x, y, z), and positions of all joints
             of the model, for the keyframe ``stand``.
 
     Raises:
-        SetupError: The URDF is no such robot.
+        SetupError: The URDF does not describe such a robot.
     """
     spec, model = _compiled(urdf, servo, Terrain() if floor else None, timestep)
     ctrl = [start[int(model.jnt_qposadr[joint])] for joint in model.actuator_trnid[:, 0]]
@@ -91,7 +92,7 @@ def mjcf(
 
 
 def _with_position_servos(text: str) -> str:
-    """Write position servos as such: others do not recognize the general form of MuJoCo."""
+    """Use MuJoCo's position actuators: other tools do not recognize the general form."""
     root = ET.fromstring(text)  # noqa: S314  # written by MuJoCo itself
     for servo in root.findall('actuator/general'):
         servo.tag = 'position'
@@ -131,10 +132,10 @@ def _compiled(
 
 
 def _load(urdf: str) -> mujoco.MjSpec:
-    """Read the robot, with the names that the links have here.
+    """Load the robot, with this module's link names.
 
-    Not what is only seen, whose meshes may be elsewhere, and frames on floating joints, for which
-    MuJoCo has no place.
+    Skip visual geometry, whose meshes may be elsewhere, and frames on floating joints, which
+    MuJoCo lacks.
     """
     tree = read_urdf(urdf)
     root = ET.fromstring(urdf)  # noqa: S314  # read_urdf takes it, too
@@ -194,7 +195,7 @@ def _let_legs_collide(spec: mujoco.MjSpec) -> None:
 
 
 def _hold(spec: mujoco.MjSpec) -> None:
-    """Make the trunk too heavy to be moved by its legs, and spare all of it their weight."""
+    """Make the trunk too heavy for its legs to move, and compensate its gravity."""
     base = _body(spec, BASE)
     legs = sum(float(body.mass) for body in spec.bodies if body.name != BASE)
     base.mass, base.gravcomp = HELD_MASS, 1.0 + legs / HELD_MASS
@@ -230,7 +231,7 @@ def _add_floor(spec: mujoco.MjSpec, terrain: Terrain) -> None:
 
 
 def _bumps(terrain: Terrain) -> Array:
-    """Return heights from 0, which is below the plane, to 1; flat around the start."""
+    """Return terrain heights from 0 (below the plane) to 1; flat around the start."""
     heights = np.random.default_rng(terrain.seed).random((_BUMP_CELLS, _BUMP_CELLS))
     heights /= heights.max()
     places = _BUMP_CELL * (np.arange(_BUMP_CELLS) - 0.5 * (_BUMP_CELLS - 1))
@@ -292,21 +293,21 @@ BANDWIDTH: Final = 20.0  # [Hz] of the accelerometer's low-pass, as IMU chips ha
 
 
 def base_rotation(data: mujoco.MjData) -> Array:
-    """Return the rotation of base_link to the world, of the positions as they are now."""
+    """Return the present rotation of base_link in the world."""
     return _matrix(data.qpos[3:7])
 
 
 def vector(array: Array) -> Vector:
-    """Return three numbers of an array."""
+    """Return the first three numbers of an array."""
     x, y, z = array.tolist()
     return x, y, z
 
 
 class InertialUnit:
-    """What imu_link feels. :meth:`sample` goes with every step of the physics."""
+    """Simulated IMU at imu_link. Call :meth:`sample` in every physics step."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Fix the unit to the robot; the arrays of its data stay where they are."""
+        """Bind the IMU to the robot's data arrays."""
         self._data = data
         self._accelerometer = _readings(model, data, ACCELEROMETER)
         self._gyro = _readings(model, data, GYRO)
@@ -318,11 +319,11 @@ class InertialUnit:
         self.rest()
 
     def rest(self) -> None:
-        """Be at rest: a low-pass that begins at zero would report a fall."""
+        """Reset the filter to rest: a low-pass that starts at zero would report a fall."""
         self._force = self._rotation().T @ self._gravity
 
     def sample(self) -> None:
-        """Filter what the accelerometer measures now."""
+        """Filter the present accelerometer value."""
         # in place: this is done 500 times a second of the simulation
         change = self._change
         np.subtract(self._accelerometer, self._force, out=change)
@@ -330,7 +331,7 @@ class InertialUnit:
         self._force += change
 
     def read(self) -> Imu:
-        """Return what the unit measures; its attitude is that of imu_link in the world."""
+        """Return the IMU values; the attitude is that of imu_link in the world."""
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, self._rotation().ravel())
         w, x, y, z = quaternion.tolist()
@@ -342,7 +343,7 @@ class InertialUnit:
 
 
 def _readings(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> Array:
-    """Return a view of what a sensor measures."""
+    """Return a view of a sensor's values."""
     sensor = model.sensor(name)
     start = int(sensor.adr[0])
     view: Array = data.sensordata[start : start + int(sensor.dim[0])]
@@ -361,7 +362,7 @@ FLATTEST = 1e-4  # [m] height of bumps without any; they lie below the plane
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """How a robot and its ground differ from what they were made as."""
+    """Deviations of robot and ground from the nominal model."""
 
     friction: float | None = None  # of the ground; None leaves that of the terrain
     trunk_mass: float = 1.0  # factor of mass and inertia of the trunk
@@ -373,7 +374,7 @@ class Variation:
     bumps: float = 1.0  # factor of the height of bumps on the ground, at most 1
 
     def __post_init__(self) -> None:
-        """Refuse what no robot has."""
+        """Reject unrealistic values."""
         friction = 1.0 if self.friction is None else self.friction
         positive = (friction, self.trunk_mass, self.stiffness)
         others = (self.damping, self.delay, self.backlash, self.refresh)
@@ -393,10 +394,10 @@ AS_MADE = Variation()
 
 
 class VariedModel:
-    """A model that can be varied again and again; each variation counts from the original."""
+    """A model to which variations can be applied repeatedly, each to the original."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Keep what may change."""
+        """Store the original values."""
         self._model = model
         welded = model.body_weldid == model.body_weldid[model.body(BASE).id]
         self._trunk = np.flatnonzero(welded)
@@ -413,7 +414,7 @@ class VariedModel:
         self._present = AS_MADE
 
     def vary(self, data: mujoco.MjData, variation: Variation) -> None:
-        """Apply a variation; the servos hold."""
+        """Apply a variation; the servos have torque."""
         model = self._model
         model.actuator_gainprm[:] = self._gains * variation.stiffness
         model.actuator_biasprm[:] = self._biases

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in physics: targets in, time passes, poses and sensor values out."""
+"""The robot in physics simulation: takes targets, advances time, returns sensor values."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _FAR = 10.0  # [m] farther than any part of a robot is from the floor at the sta
 
 
 def start_positions(joints: Sequence[str], pose: Mapping[str, float]) -> Array:
-    """Return where the joints are at the start [rad]; those that the pose leaves out stand.
+    """Return the initial joint positions [rad]; joints not in the pose get the standing pose.
 
     Raises:
         SetupError: The pose names joints that the robot lacks.
@@ -67,9 +67,9 @@ def place(
     orientation: Quaternion,
     drop: float,
 ) -> None:
-    """Put the robot's lowest point on the ground, or a drop [m] above; its data change in place.
+    """Put the robot's lowest point on the ground, or a drop [m] above; modifies its data.
 
-    Joints that mimic others go where those are; the base turns as the ground does.
+    Mimic joints follow their joints; the base is aligned with the ground.
     """
     _follow_mimics(model, data)
     normal = np.array(terrain.normal)
@@ -97,7 +97,7 @@ def _follow_mimics(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _places(addresses: list[int]) -> slice | list[int]:
-    """Return addresses as a slice, which copies nothing, if they follow each other."""
+    """Convert consecutive addresses to a slice, which copies nothing."""
     first, count = addresses[0], len(addresses)
     follows = addresses == list(range(first, first + count))
     return slice(first, first + count) if follows else addresses
@@ -118,8 +118,8 @@ UNSTABLE: Final = [
 class Robot:
     """A quadruped that stands on the ground, driven by its servos.
 
-    Time passes in :meth:`step` only. Two robots with equal arguments and equal calls have equal
-    states, bit for bit, on one machine.
+    Time advances only in :meth:`step`. On one machine, equal arguments and calls give bitwise
+    equal states.
     """
 
     def __init__(
@@ -137,10 +137,10 @@ class Robot:
         """Put the robot on the ground.
 
         Args:
-            timestep: Of the integration [s].
-            pose: Joint positions at the start [rad]; the standing pose for those left out.
-            noise: What :meth:`measure` adds to the truth.
-            held: The trunk is held in the air, level, and the legs hang free.
+            timestep: Integration time step [s].
+            pose: Initial joint positions [rad]; joints left out get the standing pose.
+            noise: Noise that :meth:`measure` adds.
+            held: Hold the trunk level in the air, so that the legs hang free.
 
         Raises:
             SetupError: The URDF cannot be simulated, or the pose names joints that it lacks.
@@ -176,12 +176,12 @@ class Robot:
         orientation: Quaternion = IDENTITY,
         drop: float = 0.0,
     ) -> None:
-        """Stand on the ground again, as a new robot with these arguments would.
+        """Reset to standing, as a new robot with these arguments would.
 
         Args:
-            pose: Joint positions at the start [rad]; the standing pose for those left out.
-            variation: How robot and ground differ from what they were made as.
-            orientation: Of base_link on level ground, (x, y, z, w); another one lets it fall.
+            pose: Initial joint positions [rad]; joints left out get the standing pose.
+            variation: Deviations of robot and ground from the nominal model.
+            orientation: Rotation of base_link on level ground, (x, y, z, w); if tilted, it falls.
             drop: Height of the lowest point above the ground [m], from which it falls.
 
         Raises:
@@ -217,15 +217,15 @@ class Robot:
     # -- what may be done to it
 
     def set_targets(self, targets: Targets, duration: float | None = None) -> None:
-        """Set new targets of the servos.
+        """Set new servo targets.
 
         Args:
-            targets: By name, or all in the order of the URDF; [rad], of a gripper [m]. What lies
-                beyond a limit of the URDF is taken to the limit.
-            duration: Time in which the set-point goes there [s]; None for the servo's own.
+            targets: By name, or all in the order of the URDF; [rad], of a gripper [m]. They are
+                clamped to the limits of the URDF.
+            duration: Time for the set-point to get there [s]; None for the servo's own.
 
         Raises:
-            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or the count is wrong.
         """
         duration = self._servo.interpolation if duration is None else duration
         due = -(-(self._steps + self._delay) // self._refresh) * self._refresh
@@ -241,12 +241,12 @@ class Robot:
         """Switch servos on or off.
 
         Args:
-            joints: Their names; all for None.
-            hold: One that is switched on holds the position that it has; else it goes to its last
-                target at once.
+            joints: Joint names; None for all.
+            hold: A servo that is switched on holds its position; else it goes to its last target
+                at once.
 
         Raises:
-            SetupError: There is no such joint.
+            SetupError: A joint is unknown.
         """
         names = self.joint_names if joints is None else tuple(joints)
         unknown = sorted(set(names) - set(self.joint_names))
@@ -268,15 +268,15 @@ class Robot:
                 self._ramp.approach({name: float(place)}, 0.0)
 
     def torque_on(self, joint: str) -> bool:
-        """Return whether a servo holds."""
+        """Return whether a servo has torque."""
         return bool(self._model.actuator_gainprm[self.joint_names.index(joint), 0] > 0.0)
 
     def push(self, force: Vector, duration: float = 0.1) -> None:
-        """Push the trunk at its centre of mass; a push that is still going on ends.
+        """Push the trunk at its centre of mass; this replaces a push in progress.
 
         Args:
-            force: [N] in the frame that has the robot's heading: x forward, y left, z up.
-            duration: [s]
+            force: Force [N] in the frame with the robot's heading: x forward, y left, z up.
+            duration: Duration [s].
 
         Raises:
             SetupError: A number is not finite, far too large, or the duration is negative.
@@ -289,10 +289,10 @@ class Robot:
         self._push_until = self._steps + round(duration / self._model.opt.timestep)
 
     def kick(self, velocity: Vector) -> None:
-        """Change the velocity of the whole robot at once.
+        """Change the velocity of the whole robot instantly.
 
         Args:
-            velocity: The change [m/s] in the frame that has the robot's heading.
+            velocity: Velocity change [m/s] in the frame with the robot's heading.
 
         Raises:
             SetupError: A number is not finite, or far too large.
@@ -302,13 +302,13 @@ class Robot:
         self._data.qvel[:3] += self._heading_to_world(velocity)
 
     def step(self, duration: float) -> None:
-        """Advance the time in whole time steps; what is left over comes with the next call.
+        """Advance by whole time steps; the remainder is carried over to the next call.
 
         Args:
-            duration: [s]
+            duration: Duration [s].
 
         Raises:
-            SimulationError: The physics blew up.
+            SimulationError: The simulation became unstable.
         """
         self._remainder += duration / self._model.opt.timestep
         count = int(self._remainder + 1e-6)
@@ -340,25 +340,25 @@ class Robot:
 
     @property
     def mass(self) -> float:
-        """Mass of all of it [kg]."""
+        """Total mass [kg]."""
         return float(self._model.body_mass.sum())
 
     @property
     def base_pose(self) -> BasePose:
-        """Where base_link is."""
+        """Pose of base_link."""
         x, y, z, qw, qx, qy, qz = self._data.qpos[:7].tolist()
         return BasePose((x, y, z), (qx, qy, qz, qw))
 
     @property
     def base_velocity(self) -> BaseVelocity:
-        """How base_link moves, expressed in base_link."""
+        """Velocity of base_link, expressed in base_link."""
         # MuJoCo has the linear part in the world and the angular part in the body
         linear = base_rotation(self._data).T @ self._data.qvel[:3]
         return BaseVelocity(vector(linear), vector(self._data.qvel[3:6]))
 
     @property
     def centre_of_mass(self) -> Vector:
-        """Centre of mass of all of it, in the world [m]."""
+        """Centre of mass of the robot, in the world [m]."""
         return vector(self._data.subtree_com[self._base])
 
     @property
@@ -373,17 +373,17 @@ class Robot:
 
     @property
     def joint_torques(self) -> Array:
-        """What the servos do [N m], the gripper's [N], a copy."""
+        """Servo torques [N m], of the gripper [N], a copy."""
         return np.array(self._data.actuator_force)
 
     @property
     def joint_targets(self) -> Array:
-        """Where the servos' set-points are now [rad], of the gripper [m], a copy."""
+        """Present set-points of the servos [rad], of the gripper [m], a copy."""
         return np.array(self._ramp.values)
 
     @property
     def imu(self) -> Imu:
-        """What an ideal IMU feels; its attitude is that of imu_link in the world."""
+        """Values of an ideal IMU; the attitude is that of imu_link in the world."""
         return self._inertial.read()
 
     @property
@@ -393,20 +393,20 @@ class Robot:
 
     @property
     def foot_contacts(self) -> tuple[bool, ...]:
-        """Which feet touch the ground."""
+        """Whether each foot touches the ground."""
         return tuple(bool(force > 0.0) for force in self.foot_forces)
 
     def link_position(self, link: str) -> Vector:
-        """Return where the origin of a link is, in the world [m]."""
+        """Return the position of a link's origin in the world [m]."""
         return vector(self._data.body(link).xpos)
 
     def mjcf(self, *, floor: bool) -> str:
-        """Return the robot as MJCF, with the pose of now as keyframe ``stand``."""
+        """Return the robot as MJCF, with the present pose as keyframe ``stand``."""
         timestep = float(self._model.opt.timestep)
         return mjcf(self._urdf, self._servo, timestep, self._data.qpos.tolist(), floor=floor)
 
     def measure(self) -> Measurement:
-        """Return what the sensors measure, with the noise that the robot was made with."""
+        """Return the sensor values, with the robot's noise."""
         truth = Measurement(
             imu=self.imu,
             positions=self.joint_positions,
@@ -418,12 +418,12 @@ class Robot:
     # -- inside
 
     def _take_targets(self, until: int) -> None:
-        """Begin to approach the targets that come up to a step."""
+        """Start ramping to the targets that are due before a step."""
         while self._coming and self._coming[0][0] <= until:
             self._ramp.begin(*self._coming.popleft()[1:])
 
     def _set_controls(self, controls: Array) -> None:
-        """Set what the servos pull to: nowhere within their free width."""
+        """Set the servo controls; within the free width, there is no torque."""
         values = self._ramp.values
         if not self._has_play:
             controls[:] = values

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_teleop teleop_keyboard`` and ``teleop_gamepad``: drive with keys, or a gamepad.
+"""``ros2 run quad_teleop teleop_keyboard`` and ``teleop_gamepad``: drive by keys or gamepad.
 
-What both have in common stands first: parameters, topics, requests to the controller and its
-reports. Values of another kind or out of their range raise ParameterError, those that make no
-sense together SettingError.
+Common parts come first: parameters, topics, requests to the controller and its reports. Values of
+wrong type or out of range raise ParameterError, contradictory ones SettingError.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ TURNS = (MIN_SPEED, 10.0)  # [rad/s]
 
 
 def declare_speeds(node: Node, defaults: Mapping[str, Speeds]) -> list[Speeds]:
-    """Declare ``speed`` and ``turn`` for each prefix of their names, and the limits of all."""
+    """Declare ``speed`` and ``turn`` for each name prefix, and the limits of all."""
     read, limits = ParameterReader(node), Speeds()
     speed_limit = read.number('speed_limit', limits.linear_limit, SPEEDS, 'Highest speed [m/s]')
     turn_limit = read.number('turn_limit', limits.angular_limit, TURNS, 'Highest turn [rad/s]')
@@ -69,7 +68,7 @@ def declare_speeds(node: Node, defaults: Mapping[str, Speeds]) -> list[Speeds]:
 
 
 def declare_stream(node: Node) -> CommandStream[Velocity]:
-    """Declare how often to publish."""
+    """Declare the publishing rate."""
     read = ParameterReader(node)
     rate = read.number('repeat_rate', 20.0, (4.0, 200.0), 'Messages while active [Hz]')
     return CommandStream(1.0 / rate, rest_of)
@@ -83,7 +82,7 @@ class _Question:
 
 
 class CommandClient:
-    """Client of a service that answers ``success`` and ``message``. Times are in [s]."""
+    """Client of a service that returns ``success`` and ``message``. Times are in [s]."""
 
     def __init__(
         self,
@@ -95,15 +94,15 @@ class CommandClient:
         *,
         drops_repeats: bool = True,
     ) -> None:
-        """Make the client.
+        """Create the client.
 
         Args:
-            node: The node; answers arrive while it is spun.
+            node: The node; spin it to receive answers.
             service_type: Type of the service.
-            service: Its name.
-            show: Receives the answers, and why there is none.
-            granted: Receives what was requested, when it was granted.
-            drops_repeats: The same request is not sent again while a key repeats it.
+            service: Name of the service.
+            show: Called with each answer, or the reason for its absence.
+            granted: Called with the request when it was granted.
+            drops_repeats: Do not resend the same request while a key repeats it.
         """
         self._client = node.create_client(service_type, service)
         self._name = node.resolve_service_name(service)
@@ -115,7 +114,7 @@ class CommandClient:
         self._is_waiting = False  # for the service to be found
 
     def request(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
-        """Send a request, named by a word; one that is still open is dropped."""
+        """Send a named request; this drops a pending one."""
         last = self._question
         if (
             self._drops_repeats
@@ -130,13 +129,13 @@ class CommandClient:
         self.check(now)
 
     def cancel(self) -> None:
-        """Drop a question that is still open: it is not sent any more, or its answer ignored."""
+        """Drop a pending request: do not send it, or ignore its answer."""
         self._question = None
         self._is_waiting = False
         self._forget()
 
     def check(self, now: float) -> None:
-        """Send what waits for the service; give up what is overdue."""
+        """Send requests that wait for the service; drop overdue ones."""
         question = self._question
         if question is None:
             return
@@ -184,11 +183,11 @@ class RobotLink:
     """
 
     def __init__(self, node: Node, say: Callable[[str], None]) -> None:
-        """Declare the parameters of the topics, and connect.
+        """Declare the topic parameters, and connect.
 
         Raises:
-            ParameterError: A value is of another kind.
-            SettingError: Neither kind of message is wanted.
+            ParameterError: A value has the wrong type.
+            SettingError: Both message types are disabled.
         """
         read = ParameterReader(node)
         twist = read.flag('twist', 'publish cmd_vel (Twist)', default=True)
@@ -216,11 +215,11 @@ class RobotLink:
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether the velocities have subscribers."""
+        """Whether the velocity topics have subscribers."""
         return any(publisher.get_subscription_count() for publisher in self._publishers)
 
     def report(self, now: float) -> ControllerReport | None:
-        """Return what the controller reported last; None when that is long ago."""
+        """Return the last controller report; None if it is outdated."""
         report = self._report
         return report if report is not None and report.is_fresh(now) else None
 
@@ -241,7 +240,7 @@ class RobotLink:
     def handle(self, request: Mode | BodyPose | RobotRequest, now: float) -> None:
         """Request a mode, publish a pose of the body, clear the faults, or stop.
 
-        Each stop is sent; a mode that was requested before is not any more.
+        Every stop is sent; it cancels an earlier mode request.
         """
         match request:
             case Mode():
@@ -258,17 +257,17 @@ class RobotLink:
                 self._stops.request('stop', Trigger.Request(), now)
 
     def serve(self, now: float) -> None:
-        """Send and give up the requests that are due."""
+        """Send due requests and drop overdue ones."""
         for client in (self._modes, self._faults, self._stops):
             client.check(now)
 
     def flush(self) -> None:
-        """Wait until the last velocities have arrived, for a while at most."""
+        """Wait a limited time until the last velocities have arrived."""
         for publisher in self._publishers:
             publisher.wait_for_all_acked(FLUSH_TIMEOUT)
 
     def _say_once(self, text: str) -> None:
-        """Show an answer, but not again for each repetition of a key that is held."""
+        """Show an answer, but only once while a held key repeats."""
         now = time.monotonic()
         if text != self._said or now - self._said_at >= KEY_REPEAT_TIME:
             self.say(text)
@@ -296,8 +295,8 @@ class TeleopKeyboard(TeleopNode):
         """Declare the parameters and advertise the topics.
 
         Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            SettingError: Parameters make no sense together.
+            ParameterError: A parameter is misspelt, of the wrong type or out of range.
+            SettingError: Parameters contradict each other.
         """
         super().__init__('teleop_keyboard')
         self.source, held = declare_keyboard(self)
@@ -316,12 +315,12 @@ class TeleopGamepad(TeleopNode):
 
     @destroyed_when_refused
     def __init__(self, devices: InputDevices | None = None) -> None:
-        """Declare the parameters and advertise the topics; devices are those of this machine.
+        """Declare the parameters and advertise the topics; use this machine's devices.
 
         Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            SettingError: Parameters make no sense together.
-            PresetError: There is no preset of that name.
+            ParameterError: A parameter is misspelt, of the wrong type or out of range.
+            SettingError: Parameters contradict each other.
+            PresetError: The preset is unknown.
         """
         super().__init__('teleop_gamepad')
         self.source, deadman = declare_gamepad(self, devices)

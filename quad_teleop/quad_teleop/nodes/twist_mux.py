@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_teleop twist_mux``: several sources of velocities, one robot."""
+"""``ros2 run quad_teleop twist_mux``: multiplexes several velocity sources to one robot."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ MAX_TIMEOUT = 1e6  # [s]
 
 
 class TwistMux(Node):
-    """Forwards the velocities of the source of the highest priority to ``cmd_vel_out``."""
+    """Forwards the source with the highest priority to ``cmd_vel_out``."""
 
     @destroyed_when_refused
     def __init__(self) -> None:
         """Read the parameters and subscribe.
 
         Raises:
-            ParameterError: A parameter is misspelt, or of another kind.
-            SettingError: The sources and locks make no sense.
+            ParameterError: A parameter is misspelt or of the wrong type.
+            SettingError: The sources and locks are invalid.
         """
         super().__init__('twist_mux')
         read = ParameterReader(self)
@@ -117,11 +117,11 @@ class TwistMux(Node):
 
 
 def _inputs(node: Node, read: ParameterReader) -> Inputs:
-    """Read sources and locks; the defaults when there is not one parameter of them.
+    """Read sources and locks; use the defaults if no parameter sets any.
 
     Raises:
-        ParameterError: A parameter is misspelt, of another kind or out of its range.
-        SettingError: One is unknown or missing, or they make no sense together.
+        ParameterError: A parameter is misspelt, of the wrong type or out of range.
+        SettingError: A parameter is unknown or missing, or parameters contradict each other.
     """
     given = given_values(node)
     sources, locks = (_group(prefix, given, read) for prefix in GROUPS)
