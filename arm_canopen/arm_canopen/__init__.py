@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
-The names here are the public API. Those that need ROS, or take long, are loaded when they are
-used. Public besides: `config`, which reads bus.yml. Buses, tables and EDS files are those of
-:mod:`canopen_core`.
+The names here are the public API. Those that need ROS or load slowly are imported on first use.
+The sub-package `config`, which reads bus.yml, is public, too. Buses, tables and EDS files come
+from :mod:`canopen_core`.
 """
 
 from __future__ import annotations

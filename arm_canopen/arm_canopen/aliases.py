@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Programs of canopen_sim and canopen_tools by the names that they have in arm_canopen, too."""
+"""Former names of the canopen_sim and canopen_tools programs, kept in arm_canopen."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def fake_slaves() -> None:
 
 
 def candump() -> None:
-    """Show the frames of a bus in words: candump of canopen_tools, by its former name."""
+    """Decode and print the frames of a bus: candump of canopen_tools, by its former name."""
     _run('canopen_tools', 'candump')
 
 

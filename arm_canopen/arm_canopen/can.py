@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""CAN buses by the name that they had before :mod:`canopen_core.can`."""
+"""Former import path of :mod:`canopen_core.can`."""
 
 from canopen_core.can import Bus, Frame, open_bus
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The CANopen master of one bus, from the first frame to the safe end, without ROS."""
+"""CANopen master of one bus, from boot to safe shutdown, without ROS."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its ow
 INSISTED, INSIST_PAUSE = 10, 0.01  # times and [s] in which a full queue has to take a last frame
 QUEUED_CYCLES = 2  # whose frames may wait for the bus; older ones are worth nothing
 NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED, EventKind.SDO)
-"""A device that is absent is no fault of one in operation."""
+"""Events of absent devices, which are no faults of devices in operation."""
 BOOT_ATTEMPTS = 10  # boot time-outs of a device for which a boot waits
 LEVELS = {
     Severity.INFO: logging.INFO,
@@ -70,13 +70,13 @@ def log_event(event: Event) -> None:
 async def leave_device(
     device: RemoteNode, axes: Sequence[AxisCommands], scheduler: Scheduler
 ) -> None:
-    """Stop the axes of a device, then let the master end without a reaction of the device.
+    """Stop the axes of a device, so that it does not react to the end of the master.
 
-    From the first step on, nothing but that is commanded to them.
+    From the first step on, the axes get no other commands.
 
     Raises:
-        DriveError: An axis was not seen to rest without power; the device goes on to watch the
-            master, and stops it.
+        DriveError: An axis did not confirm standstill without power; the device keeps monitoring
+            the master, and stops the axis when the master ends.
     """
     ends = [axis.leave() for axis in axes]
     if not device.was_booted:
@@ -97,19 +97,19 @@ def frames_per_cycle(config: BusConfig) -> int:
 class CanopenMaster:
     """Master of one bus: boots its devices, runs the SYNC cycle, and stops the drives at the end.
 
-    The cycle is that of the ROS node. It runs in a thread that belongs to this object; the calls
-    come from any other thread, and each waits for its result; before :meth:`boot` and after
-    :meth:`close` they raise a BusError. Leaving the ``with`` statement, or
-    :meth:`close`, brings every drive to quick stop and disables it. So does the end of a program
-    that forgot it; drives of one that was killed stop by the heartbeat of the master (0x1016).
+    The object runs the same cycle as the ROS node, in its own thread. Call its methods from any
+    other thread: each waits for its result, and raises a BusError before :meth:`boot` and after
+    :meth:`close`. :meth:`close`, or leaving the ``with`` statement, brings every drive to quick
+    stop and disables it. So does the end of a program that did neither; if the program is killed,
+    the drives stop because the heartbeat of the master is missing (0x1016).
 
     Attributes:
         bus: The configuration of the bus.
         drives: The axes of its drives, by the names of bus.yml.
         devices: Its devices, by the names of bus.yml.
 
-    The other attributes and methods are for a program that shows the bus by means of its own, as
-    the ROS nodes do: what is handed to its thread is never waited for there.
+    The other attributes and methods are for programs with their own interface to the bus, such as
+    the ROS nodes, which hand work to its thread without waiting.
     """
 
     def __init__(
@@ -123,16 +123,16 @@ class CanopenMaster:
         black_box: BlackBoxSettings | None = None,
         clock: Clock | None = None,
     ) -> None:
-        """Build it; nothing is sent before :meth:`boot`.
+        """Create the master; it sends nothing before :meth:`boot`.
 
         Args:
             config: The bus.
-            can: The open CAN interface; it stays the caller's to close.
-            on_event: Takes what happens on the bus, in the thread of the cycle: it must not wait.
+            can: The open CAN interface; the caller closes it.
+            on_event: Called with each event of the bus, in the cycle thread; it must not block.
             thread_priority: SCHED_FIFO priority of the cycle, where it is allowed; 0 for none.
-            beside_master: Start although another master is found, and command no device of its.
-            black_box: How the last frames are written when a fault happens; None for not at all.
-            clock: The time of tests; None for the steady clock.
+            beside_master: Start even if another master is found, and command none of its devices.
+            black_box: Settings for recording the last frames at a fault; None for no recording.
+            clock: Replaced in tests; None for the steady clock.
         """
         self.bus = config
         self.can = can
@@ -191,13 +191,13 @@ class CanopenMaster:
         thread_priority: int = THREAD_PRIORITY,
         beside_master: bool = False,
     ) -> Self:
-        """Read a bus.yml and open a bus, which :meth:`close` closes.
+        """Create a master from a bus.yml, and open its bus; :meth:`close` closes the bus.
 
         Args:
             path: The bus.yml.
             bus: Name of the bus: ``can0``, ``vcan0``, ``udp_multicast:239.x.y.z[:port]``,
                 ``INTERFACE:CHANNEL[@BITRATE]`` of python-can, or ``auto``.
-            on_event: As of the constructor; so are those that follow.
+            on_event: This and the arguments below are those of the constructor.
 
         Raises:
             ConfigError: The bus.yml or an EDS is wrong; every problem is listed.
@@ -221,13 +221,14 @@ class CanopenMaster:
     def boot(self, timeout: float | None = None) -> None:
         """Listen for another master, start the cycle, and wait until all devices are operational.
 
-        Called again, it waits for devices that were missing or got lost; they are booted whenever
-        they come. The ``timeout`` is in [s], by default ten boot time-outs of the slowest device.
+        Call it again to wait for devices that were missing or lost; the master boots them whenever
+        they appear. The ``timeout`` is in [s], by default ten boot time-outs of the slowest
+        device.
 
         Raises:
-            OtherMasterError: Another master leads this bus, or that is not known.
+            OtherMasterError: Another master was found or cannot be ruled out.
             BootError: Devices are missing; the message has the phase of each.
-            BusError: The master has ended, or ends by a defect meanwhile.
+            BusError: The master has ended, or a defect ends it meanwhile.
         """
         if self._closed:
             raise BusError(f'{OWNER} has ended')
@@ -259,7 +260,7 @@ class CanopenMaster:
         """Return a drive by its name in bus.yml.
 
         Raises:
-            KeyError: There is none of that name.
+            KeyError: There is no drive of that name.
         """
         if name not in self.drives:
             raise KeyError(
@@ -280,7 +281,7 @@ class CanopenMaster:
         raise KeyError(f'no device {name!r} on this bus; choose one of {known}')
 
     def sdo(self, name: str | int) -> DeviceSdo:
-        """Return the objects of a device, by its name in bus.yml or its node id.
+        """Return the SDO access to a device, by its name in bus.yml or its node id.
 
         Raises:
             KeyError: bus.yml has no such device.
@@ -297,7 +298,7 @@ class CanopenMaster:
         self.begin_attach(source).result()
 
     def detach(self, source: MotionSource) -> None:
-        """End a motion source; drives that it moved are braked.
+        """Detach a motion source, and brake the drives that it moved.
 
         Raises:
             BusError: The master has ended.
@@ -305,10 +306,10 @@ class CanopenMaster:
         self.begin_detach(source).result()
 
     def close(self) -> None:
-        """Stop and disable all drives, end the cycle, close the bus; again is no error.
+        """Stop and disable all drives, end the cycle, close the bus; repeated calls are allowed.
 
         Raises:
-            DriveError: A drive did not stop, or that is unknown; all else is done.
+            DriveError: A drive did not stop, or its state is unknown; everything else is done.
         """
         if self._closed:
             return
@@ -322,7 +323,7 @@ class CanopenMaster:
                 self.end()
 
     def __enter__(self) -> Self:
-        """Use it in a with statement."""
+        """Return the master itself."""
         return self
 
     def __exit__(
@@ -331,7 +332,7 @@ class CanopenMaster:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close it; a drive that does not stop hides no error of before."""
+        """Close the master; a drive that does not stop never hides an earlier error."""
         try:
             self.close()
         except DriveError as error:
@@ -347,11 +348,11 @@ class CanopenMaster:
         """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Returns:
-            The other master, or why none could be found, where the bus is led beside it; else
-            empty.
+            The other master, or why none could be found, if the bus runs beside it; else empty.
 
         Raises:
-            OtherMasterError: There is one, or that is not known, and beside_master is not set.
+            OtherMasterError: Another master was found or cannot be ruled out, and beside_master is
+                not set.
         """
         if not self._beside_master:
             refuse_other_master(self.can, self.bus, self._clock.now)
@@ -363,14 +364,14 @@ class CanopenMaster:
         return describe(found) if found else ''
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Boot the devices and start the cycle, after ``begin`` in its thread."""
+        """Boot the devices and start the cycle; its thread calls ``begin`` first."""
         self.started = True
         if self.black_box is not None:
             self.black_box.start()
         self.thread.start(begin)
 
     def end(self) -> None:
-        """End the cycle, and write what the black box still has to write."""
+        """End the cycle, and write pending recordings of the black box."""
         self.thread.stop()
         if self.black_box is not None:
             self.black_box.close()
@@ -379,7 +380,7 @@ class CanopenMaster:
         """Bring every drive to quick stop and disable it; the cycle goes on.
 
         Raises:
-            DriveError: They did not all stop, or that is unknown.
+            DriveError: A drive did not stop, or its state is unknown.
         """
         scheduler = self.network.scheduler
 
@@ -407,8 +408,8 @@ class CanopenMaster:
         """Attach a motion source from any thread, without waiting.
 
         Returns:
-            Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
-            cycle ends or has ended.
+            A future, done before the next cycle. Its errors: KeyError, an axis is no drive of this
+            bus; BusError, the cycle ends or has ended.
         """
 
         def attach() -> None:
@@ -419,7 +420,7 @@ class CanopenMaster:
         return self.thread.call(attach)
 
     def begin_detach(self, source: MotionSource) -> Future[None]:
-        """End a motion source, from any thread; drives that it moved are braked.
+        """Detach a motion source from any thread, and brake the drives that it moved.
 
         Returns:
             Done before the next cycle.
@@ -429,7 +430,7 @@ class CanopenMaster:
     def _stop_without_cycle(self) -> str:
         """Send a quick stop to each drive that may have power, without waiting for answers.
 
-        Return what was sent, to which drives it is all that stops them, and which did not get it.
+        Return a text: what was sent, which drives nothing else stops, and which did not get it.
         """
         if self.black_box is not None:
             self.black_box.fault('', f'{OWNER} has ended by a defect')
@@ -458,7 +459,7 @@ class CanopenMaster:
         return text
 
     def _insist(self, frame: Frame) -> BusError | None:
-        """Send a frame, again and again while the bus refuses it; return why it has not left."""
+        """Send a frame, and retry while the bus refuses it; return the error if it fails."""
         refusal: BusError | None = None
         for _ in range(INSISTED):
             try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Devices and axes of the bus, for callers outside of the cycle; each call waits for its end."""
+"""Devices and axes of the bus, for callers outside of the cycle; each call blocks until done."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ MOVE_TIMEOUT = 60.0  # [s]
 class DeviceSdo:
     """Objects of a device by SDO, typed by its EDS.
 
-    An object is an index such as ``0x6041``, or what a person writes: ``'Statusword'``,
-    ``'0x607D:02'``, ``'Software position limit/Max'``. Each answer may take the ``timeout`` in
-    [s], by default the SDO time-out of bus.yml.
+    An object is an index such as ``0x6041``, or a text: ``'Statusword'``, ``'0x607D:02'``,
+    ``'Software position limit/Max'``. The ``timeout`` in [s] applies to each answer; default: the
+    SDO time-out of bus.yml.
 
     Raises:
         ObjectError: The EDS has no such object, or several; the message names them.
@@ -67,7 +67,7 @@ class DeviceSdo:
         *,
         timeout: float | None = None,
     ) -> None:
-        """Write an object; return when the device has it.
+        """Write an object; return when the device has confirmed it.
 
         Raises:
             CodecError: The value does not fit the type.
@@ -83,11 +83,11 @@ class DeviceSdo:
 
 
 class CanopenDevice:
-    """A device of bus.yml; an I/O module or an encoder needs nothing else.
+    """A device of bus.yml, such as an I/O module or an encoder.
 
     Attributes:
         name: Its name in bus.yml.
-        sdo: Its objects, by SDO in any case.
+        sdo: Its objects, always by SDO.
     """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
@@ -102,7 +102,7 @@ class CanopenDevice:
         return self._device.config
 
     def status(self) -> NodeStatus:
-        """Return how the device is: online, NMT state, boot phase, EMCYs, SDO counters.
+        """Return a snapshot of the device: online, NMT state, boot phase, EMCYs, SDO counters.
 
         Raises:
             BusError: The master has ended.
@@ -110,7 +110,7 @@ class CanopenDevice:
         return self._thread.call(lambda: node_status(self._device, self._thread.now())).result()
 
     def read(self, target: int | str, subindex: int = 0, *, timeout: float | None = None) -> Value:
-        """Return the value of an object: from its TPDO while that comes, else by SDO.
+        """Read an object: from its TPDO while that is received, else by SDO.
 
         Arguments and errors are those of :class:`DeviceSdo`.
         """
@@ -133,13 +133,13 @@ class CanopenDevice:
         *,
         timeout: float | None = None,
     ) -> None:
-        """Write an object: by the RPDOs that carry it, which no device confirms, else by SDO.
+        """Write an object: by the RPDOs that carry it, without confirmation, else by SDO.
 
-        The other objects of such an RPDO keep what they have. Arguments and errors are those of
-        :meth:`DeviceSdo.write`; an RPDO needs a device that is operational.
+        The other objects of such an RPDO keep their values. Arguments and errors are those of
+        :meth:`DeviceSdo.write`; an RPDO needs an operational device.
 
         Raises:
-            CanopenError: The device is not operational, or the bus does not take the RPDO.
+            CanopenError: The device is not operational, or the bus refuses the RPDO.
         """
         path = _path(target, subindex)
         objects, address = self._device.objects, find_object(self.config.dictionary, path).address
@@ -154,13 +154,13 @@ class CanopenDevice:
     def subscribe(
         self, target: int | str, callback: Callable[[Number], None], subindex: int = 0
     ) -> Callable[[], None]:
-        """Call back with the value of an object whenever a TPDO has brought it.
+        """Call ``callback`` with each value of an object that a TPDO delivers.
 
-        The callback runs in the thread of the cycle, so it must not wait: no call of this master.
-        What it raises is logged.
+        The callback runs in the cycle thread: it must not block or call this master. Its
+        exceptions are logged.
 
         Returns:
-            A function that ends it.
+            A function that ends the subscription.
 
         Raises:
             ObjectError: The EDS has no such object, or several; or no TPDO carries it.
@@ -185,7 +185,7 @@ class CanopenDevice:
     def send_nmt(self, command: NmtCommand) -> None:
         """Send an NMT command to the device; return when the bus has taken it.
 
-        Axes that move are brought to rest before it leaves, except by START.
+        Moving axes are brought to rest first, unless the command is START.
 
         Raises:
             BusError: The bus has not taken it, or the master has ended.
@@ -198,12 +198,12 @@ class CanopenDrive:
     """A drive: its state as of the last cycle, and its commands.
 
     Positions and velocities are in the user units of bus.yml (rad and rad/s for a revolute joint).
-    A command returns what was reached, in words. It raises a DriveError where the drive refuses,
-    does not get there in time, or another command runs, and a BusError when the master has ended.
-    Commands that stop the drive end whichever runs.
+    A command returns a text that says what was reached. It raises a DriveError if the drive
+    refuses or is too late, or another command runs, and a BusError if the master has ended.
+    Commands that stop the drive cancel a running command.
 
     Attributes:
-        name: Its name in bus.yml; that of its channel for a device with several axes.
+        name: Its name in bus.yml, or its channel name on a device with several axes.
         sdo: Objects of its device.
     """
 
@@ -216,7 +216,7 @@ class CanopenDrive:
         self._thread = thread
 
     def status(self) -> DriveStatus:
-        """Return how the drive was in one cycle: state, mode, position, age, error in words.
+        """Return a snapshot of the drive: state, mode, position, age, error text.
 
         Raises:
             BusError: The master has ended.
@@ -230,7 +230,7 @@ class CanopenDrive:
 
     @property
     def position(self) -> float:
-        """Actual position; the last one of a lost drive, NaN before the first."""
+        """Actual position; the last known one of a lost drive, NaN before the first."""
         return self.status().position
 
     @property
@@ -240,27 +240,27 @@ class CanopenDrive:
 
     @property
     def mode(self) -> OperationMode:
-        """Mode of operation that is commanded."""
+        """Commanded mode of operation."""
         return self._thread.call(lambda: self._axis.mode.number).result()
 
     def init(self) -> str:
-        """Reset a fault, enable, home where bus.yml has a method; no mode is selected then."""
+        """Reset a fault, enable, and home if bus.yml names a method; select no mode."""
         return self._request('init')
 
     def enable(self) -> str:
-        """Lead to Operation Enabled; a fault is not reset."""
+        """Enable the drive (Operation Enabled); does not reset a fault."""
         return self._request('enable')
 
     def recover(self) -> str:
-        """Reset a fault and lead to Operation Enabled."""
+        """Reset a fault and enable the drive (Operation Enabled)."""
         return self._request('recover')
 
     def home(self, method: int | None = None) -> str:
-        """Home by a method of 0x6098, or the drive's own, and select the mode of before again."""
+        """Home by a method of 0x6098 (default: the drive's own); restore the previous mode."""
         return self._run('home', partial(self._commands.home, method))
 
     def select_mode(self, mode: OperationMode | int) -> str:
-        """Switch the mode of operation, by its number in 0x6060; return when the drive shows it.
+        """Switch the mode of operation, by its number in 0x6060; return when the drive reports it.
 
         Raises:
             DriveError: It is no mode of CiA 402, or the drive refuses it.
@@ -268,19 +268,19 @@ class CanopenDrive:
         return self._run('mode', partial(self._commands.select_mode, _operation_mode(mode)))
 
     def disable(self) -> str:
-        """Disable the torque (Switched On); return when the axis stands."""
+        """Disable the torque (Switched On); return when the axis has stopped."""
         return self._request('disable')
 
     def halt(self) -> str:
-        """Brake, and stay enabled; return when it stands. The next target goes on."""
+        """Brake and stay enabled; return at standstill. The next target resumes motion."""
         return self._request('halt')
 
     def quick_stop(self) -> str:
-        """Quick stop; return when it stands, in the state of its option code 0x605A."""
+        """Quick stop; return at standstill, in the state that option code 0x605A sets."""
         return self._request('quick_stop')
 
     def shutdown(self) -> str:
-        """Bring the drive to rest, and take its power away."""
+        """Bring the drive to rest, and switch off its power."""
         return self._request('shutdown')
 
     def set_target(self, target: float) -> str:
@@ -290,14 +290,14 @@ class CanopenDrive:
     def move_to(
         self, position: float, *, relative: bool = False, timeout: float = MOVE_TIMEOUT
     ) -> str:
-        """Go to a position and wait until the drive stands there.
+        """Move to a position, and wait until the drive stands still there.
 
-        In another mode than 1, 7 and 8 mode 1 (profile position) is selected first. A drive that
-        is late is halted, unless another client has begun a motion, which is an error here.
+        Unless the drive is in mode 1, 7 or 8, mode 1 (profile position) is selected first. A late
+        drive is halted, unless another client has begun a motion, which raises an error.
 
         Args:
             position: In user units.
-            relative: From the last set-point on.
+            relative: Count from the last set-point.
             timeout: How long the motion may take in [s].
         """
         if self.mode not in POSITION_MODES:

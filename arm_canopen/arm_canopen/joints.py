@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint states of single drives, put together into those of a robot, one set for each moment."""
+"""Merges joint states of single drives into those of a robot, one set per time stamp."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ START_TIMEOUT = 30.0  # [s] in which the first state of a joint comes, or comes 
 
 
 Joints: TypeAlias = Mapping[str, Mimic | None]
-"""Joints with one variable in URDF order, each with what it follows; None moves by itself."""
+"""Single-variable joints in URDF order, each with its mimic rule; None for independent joints."""
 
 
 def movable_joints(robot_description: str) -> Joints:
-    """Return the revolute, continuous and prismatic joints in the order of the URDF, XML text.
+    """Return the revolute, continuous and prismatic joints of a URDF (XML text) in its order.
 
     Raises:
-        CanopenError: It is no URDF, or has no movable joint.
+        CanopenError: The text is no URDF, or has no movable joint.
     """
     try:
         tree = read_urdf(robot_description)
@@ -44,19 +44,19 @@ class JointSample(NamedTuple):
 
 
 class JointSet(NamedTuple):
-    """States of many joints, in URDF order, at one moment in [ns] on the clock of the samples."""
+    """States of many joints, in URDF order, with one stamp in [ns] on the clock of the samples."""
 
     stamp: int
     samples: dict[str, JointSample]
 
 
 class JointAggregator:
-    """Collects samples into rounds; a round is over when all that were in the last one are there.
+    """Collects samples into rounds; a round ends when it has every joint of the previous one.
 
     Drives on one bus share the stamp of their SYNC, so a round is one SYNC. A sample of a later
-    stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that
-    are silent are left out after a while instead of being invented; until then nothing is
-    published without them, so that no subscriber sees a robot of one joint at the start.
+    stamp, or a second one of the same joint, ends a round that is still incomplete. Silent joints
+    are left out after a while, never extrapolated; until then nothing is published without them,
+    so that no subscriber sees a robot of one joint at the start.
     """
 
     def __init__(self, joints: Joints) -> None:
@@ -70,7 +70,7 @@ class JointAggregator:
         self._began: float | None = None  # steady time of the first sample in [s]
 
     def update(self, name: str, stamp: int, sample: JointSample, now: float) -> list[JointSet]:
-        """Add a sample of a joint, with its moment in [ns].
+        """Add a sample of a joint, with its stamp in [ns].
 
         Returns:
             The sets that are ready now: none, one, or two when this sample both ended a round and
@@ -92,7 +92,7 @@ class JointAggregator:
         return ready
 
     def silent(self, now: float) -> list[str]:
-        """Name the joints that are not reported, or not any more."""
+        """Return the joints that are not reported yet, or no longer."""
         return [
             name
             for name, mimic in self._joints.items()
@@ -100,7 +100,7 @@ class JointAggregator:
         ]
 
     def _may_publish(self, now: float) -> bool:
-        """Whether every joint has come, or has had its time."""
+        """Whether every joint was reported, or has timed out."""
         began = now if self._began is None else self._began
         return now - began > STALE_AFTER or not self.silent(now)
 
@@ -131,14 +131,13 @@ class SilenceWatch:
         self._silent: frozenset[str] = frozenset()
 
     def note(self, joint: str) -> None:
-        """The state of a joint has come."""
+        """Record that the state of a joint was received."""
         self._absent_since.pop(joint, None)
 
     def look(self, silent: Iterable[str], published: Iterable[str], now: float) -> list[str]:
         """Return the joints that are missing; call it every few seconds.
 
-        The ``silent`` have no states now; those of the ``published`` have a publisher in the
-        graph.
+        ``silent`` joints have no states now; ``published`` joints have a publisher in the graph.
         """
         before, self._silent = self._silent, frozenset(silent)
         there = set(published)

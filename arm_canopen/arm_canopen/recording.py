@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The frames of a bus: the last ones kept for a black box, and a log replayed.
+"""Keeps the last frames of a bus for a black box, and replays a log of frames.
 
-:class:`BusRecording` writes a log of candump. :class:`BusReplay` is the network of the master, fed
-with the frames of a log, and sending none.
+:class:`BusRecording` writes a log of candump. :class:`BusReplay` runs the network of the master on
+the frames of a log, and sends none.
 """
 
 from __future__ import annotations
@@ -53,21 +53,21 @@ DISORDER = 1024  # frames by which one may come before an older one, after a pau
 
 
 class BusRecording:
-    """Keeps what is sent and received.
+    """Keeps the last frames that were sent and received.
 
-    There is room for the window on a bus that is full of frames of eight bytes; on one with more
-    frames than fit on the real one, or shorter ones, it reaches back less far.
+    The buffer covers the window on a fully loaded bus with frames of eight bytes. It covers less
+    with shorter frames, or with more frames than a real bus can carry.
     """
 
     def __init__(self, config: BusConfig, bus_name: str, window: float) -> None:
-        """The ``window`` is how far back it reaches in [s]."""
+        """``window`` is the recorded time span in [s]."""
         self._config = config
         self._bus_name = bus_name
         self._window = window
         self.ring = FrameRing(int(window * config.master.bitrate / frame_bits(PAYLOAD_MAX)) + 1)
 
     def sending(self, send: Callable[[Frame], None]) -> Callable[[Frame], None]:
-        """Return a function that sends a frame and keeps it; one that is refused is not kept."""
+        """Wrap ``send`` to keep each frame that is sent; a refused one is not kept."""
         record, now, sent = self.ring.record, time.monotonic, FrameRing.SENT
 
         def send_and_record(frame: Frame) -> None:
@@ -78,7 +78,7 @@ class BusRecording:
         return send_and_record
 
     def receiving(self, take: Callable[[Frame], None]) -> Callable[[Frame], None]:
-        """Return a function that takes a received frame and keeps it."""
+        """Wrap ``take`` to keep each received frame."""
         record = self.ring.record
 
         def take_and_record(frame: Frame) -> None:
@@ -89,7 +89,7 @@ class BusRecording:
 
     @property
     def about(self) -> str:
-        """The bus, and how much of it is kept."""
+        """Describe the bus and the time span that is kept."""
         devices = ', '.join(f'{node.name} ({node.node_id})' for node in self._config.nodes)
         return (
             f'black box of the bus {self._bus_name}: the last {self._window:g} s, at most '
@@ -130,7 +130,7 @@ class BusRecording:
 
 
 def _sorted(chunks: Iterator[list[RecordedFrame]]) -> Iterator[list[RecordedFrame]]:
-    """Put frames in the order of their times; those that were sent wait for no kernel."""
+    """Sort frames by time: received frames are recorded with a delay, sent ones without."""
     heap: list[tuple[float, int, RecordedFrame]] = []
     number = 0
     for chunk in chunks:
@@ -152,7 +152,7 @@ STEP = 0.02  # [s] in which time passes at most without a look for what is missi
 
 
 class ReplayedAxis:
-    """An axis of a drive: its view, and what the recorded master commands to it."""
+    """An axis of a replayed drive: its view, and the commands of the recorded master."""
 
     def __init__(self, view: AxisState) -> None:
         self.view = view  # its state
@@ -163,7 +163,7 @@ class ReplayedAxis:
         self._faulted = False
 
     def forget(self) -> None:
-        """Know nothing, as at the beginning."""
+        """Reset to the initial state, in which nothing is known."""
         self.view.lose_sight()
         self.view.error = ''
         self.setpoint = self.following_error = math.nan
@@ -246,11 +246,11 @@ class BusReplay:
 
     @property
     def now(self) -> float:
-        """Time of the log that has come."""
+        """Current time of the log in [s]."""
         return self.network.scheduler.now
 
     def take(self, frame: Frame, now: float) -> None:
-        """Feed the next frame, as if it had come now."""
+        """Feed the next frame with ``now`` as its time stamp."""
         self.receive(frame._replace(timestamp=now))
 
     def receive(self, frame: Frame) -> None:
@@ -273,7 +273,7 @@ class BusReplay:
         self._update_when_due(frame.timestamp)
 
     def advance(self, now: float) -> None:
-        """Advance to ``now`` of the log in [s], so that silent devices are missed."""
+        """Advance to ``now`` of the log in [s], so that silent devices are detected."""
         while self.now < now:
             step = min(now, self.now + STEP)
             self.network.advance(step)
@@ -282,7 +282,7 @@ class BusReplay:
             self._update_when_due(step)
 
     def restart(self) -> None:
-        """Forget all devices, as the log begins again; time goes on."""
+        """Reset all devices, as the log begins again; time goes on."""
         for node in self.network.nodes.values():
             node.emergencies.restarted()
             node.nmt_state = node.wanted = None
@@ -292,7 +292,7 @@ class BusReplay:
             axis.forget()
 
     def figures(self) -> CycleFigures:
-        """Return how late each SYNC was after the one before."""
+        """Return how late each SYNC was, relative to the previous one."""
         return self._statistics.figures()
 
     def _cycle(self, now: float) -> None:
@@ -330,7 +330,7 @@ class BusReplay:
             axis.commanded = True
 
     def _note_answer(self, node: RemoteNode, frame: Frame) -> None:
-        """Store what an SDO has read, where it is part of the state."""
+        """Store a value that an SDO has read, if it is part of the state."""
         try:
             answer = sdo.decode_response(frame.data)
         except CodecError:
@@ -369,7 +369,7 @@ def _report_axis(node: RemoteNode, name: str, severity: Severity, text: str) -> 
 
 
 def unknown_scales(config: BusConfig) -> list[str]:
-    """Return the axes whose scales only the drive knows, which a log without its boot lacks."""
+    """Return axes whose scales only the drive knows; a log without its boot does not have them."""
     return [
         axis.name or node.name
         for node in config.nodes

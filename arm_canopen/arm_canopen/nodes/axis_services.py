@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services and action of an axis: commands, modes, homing with feedback, and how it counts."""
+"""Services and homing action of an axis: commands, modes, homing with feedback, and scales."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ MODE_SERVICES: dict[str, OperationMode] = {
 
 
 class AxisServices:
-    """What one axis offers, below ``~`` or, of several axes, below the name of its channel."""
+    """Services of one axis, under ``~`` or, on a multi-axis device, under its channel name."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class AxisServices:
         *,
         file: Path,
     ) -> None:
-        """``place`` is what the names begin with."""
+        """``place`` is the prefix of all names."""
         self._node = node
         self._commands = commands
         self._place = place
@@ -96,7 +96,7 @@ class AxisServices:
         self._offer(name, lambda: commands.run(name, commands.select_mode(mode)))
 
     def _admitted(self, command: Callable[[], T]) -> Callable[[], T]:
-        """Return the command with ``admit`` checked once more, in the thread of the cycle."""
+        """Wrap a command so that the cycle thread checks ``admit`` once more before it."""
 
         def run() -> T:
             self._node.admit()
@@ -118,7 +118,7 @@ class AxisServices:
         self._thread.call(stream).add_done_callback(self._note_refusal)
 
     def _note_refusal(self, future: Future[None]) -> None:
-        """Log why a stream is refused, once until the reason changes."""
+        """Log why a stream is refused; log again only when the reason changes."""
         error = future.exception()
         reason = '' if error is None else str(error)
         if reason and reason != self._refusal:
@@ -136,7 +136,7 @@ FEEDBACK_PERIOD = 0.1  # [s]
 
 @dataclass(slots=True, eq=False)
 class _Homing(ServedGoal):
-    """A goal from its request to its end."""
+    """State of one homing goal, from its request to its result."""
 
     stop_count: Future[int]  # at its request
     phase: str = HomingProgress.ENABLING.value
@@ -147,7 +147,7 @@ class _Homing(ServedGoal):
 
 
 class HomeAction:
-    """The action ``~/home`` of one axis: a goal ends when the network's thread has homed it."""
+    """Action ``~/home`` of one axis; a goal ends when the network thread has homed the axis."""
 
     def __init__(
         self,
@@ -157,7 +157,7 @@ class HomeAction:
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
-        """Offer the action; arguments as of :class:`AxisServices`."""
+        """Create the action server; arguments as for :class:`AxisServices`."""
         self._node = node
         self._commands = commands
         self._thread = thread
@@ -245,13 +245,13 @@ KEYS = (
     'scale_eff_from_dev',
     'offset_pos_from_dev',
 )
-"""Keys of bus.yml, which are the names of the fields of the answer, too."""
+"""Keys of bus.yml; the fields of the response have the same names."""
 
 
 def answer_units(
     drive: Axis, file: Path, response: ReadUnits.Response, future: Future[FactorGroup]
 ) -> ReadUnits.Response:
-    """Fill in how an axis counts, by the drive and by bus.yml."""
+    """Fill in the scales of an axis, from the drive and from bus.yml."""
     error = future.exception()
     if error is not None:
         response.message = str(error)
@@ -271,7 +271,7 @@ def answer_units(
 def offer_drive(
     node: DeviceNode, axes: Sequence[AxisCommands], thread: NetworkThread, file: Path
 ) -> DriveJointStates:
-    """Offer services and topics of a drive with one axis or several; return its joint states."""
+    """Create the services and topics of all axes of a drive; return its joint states."""
     for commands in axes:
         place = '~' if len(axes) == 1 else commands.axis.name
         AxisServices(node, commands, place, thread, file=file)

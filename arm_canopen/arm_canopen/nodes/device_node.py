@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS node of one device: NMT, SDO and raw PDO access, as ros2_canopen's proxy has them.
+"""ROS node of one device: NMT, SDO and raw PDO access, compatible with ros2_canopen's proxy.
 
-And services that read and write objects of any type by name or number. The messages of
-ros2_canopen carry objects as raw 32 bits.
+Further services read and write objects of any type by name or number. The messages of ros2_canopen
+carry objects as raw 32 bits.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ NMT_STATE_WORDS: dict[NmtState, str] = {
 
 
 def node_options(config: NodeConfig) -> dict[str, Any]:
-    """Return the options of the node of a device, by the namespace and remappings of bus.yml."""
+    """Return node options with the namespace and remappings that bus.yml sets for a device."""
     remappings = [f'{old}:={new}' for old, new in config.remappings.items()]
     arguments = [word for rule in remappings for word in ('-r', rule)]
     return {
@@ -67,7 +67,7 @@ def node_options(config: NodeConfig) -> dict[str, Any]:
 
 
 class DeviceTopics:
-    """``~/nmt_state`` and ``~/rpdo`` of a device."""
+    """Publishers of ``~/nmt_state`` and ``~/rpdo`` of a device."""
 
     def __init__(self, node: Node, device: RemoteNode, output: OutputThread) -> None:
         self._device = device
@@ -77,14 +77,14 @@ class DeviceTopics:
         self._listened = False
 
     def take_event(self, event: Event) -> None:
-        """Publish the NMT state where an event changes it."""
+        """Publish the NMT state if the event changes it."""
         if event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
             state = self._device.nmt_state
             words = 'ERROR' if state is None else NMT_STATE_WORDS[state]
             self._nmt_state.publish(String(data=words))
 
     def update_listeners(self) -> None:
-        """Publish each received object on ~/rpdo while it has subscribers, and only then."""
+        """Publish received objects on ~/rpdo only while the topic has subscribers."""
         listened = self._rpdo.get_subscription_count() > 0
         if listened != self._listened:
             self._listened = listened
@@ -127,7 +127,7 @@ NMT_SERVICES: dict[str, NmtCommand] = {
 
 
 class DeviceNode(Node):
-    """Services and topics of one device."""
+    """ROS node with the services and topics of one device."""
 
     @destroyed_when_refused
     def __init__(self, device: RemoteNode, thread: NetworkThread, output: OutputThread) -> None:
@@ -156,10 +156,9 @@ class DeviceNode(Node):
         handler: Callable[[Any], Future[Any]],
         respond: Callable[[Any, Future[Any]], Any],
     ) -> None:
-        """Offer a service of this node whose outcome is a future.
+        """Create a service that responds when a future is done.
 
-        ``handler`` is called with each request that is admitted; ``respond`` fills the response
-        in, and returns it.
+        ``handler`` gets each admitted request; ``respond`` fills in the response and returns it.
         """
 
         def admitted(request: Any) -> Future[Any]:  # noqa: ANN401
@@ -170,7 +169,7 @@ class DeviceNode(Node):
         create_deferred_service(self, service_type, name, admitted, respond, post=post)
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
-        """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
+        """Create a std_srvs/Trigger service; its message is the result or error of the future."""
 
         def respond(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
             answer_message(response, future)
@@ -289,7 +288,7 @@ class DeviceNode(Node):
 
 
 def answer_message(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
-    """Fill in success, and what the future returns, or why it failed, as the message."""
+    """Fill in success, and the result or error of the future as the message."""
     error = future.exception()
     response.success = error is None
     response.message = future.result() if error is None else str(error)
@@ -297,7 +296,7 @@ def answer_message(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
 
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa: ANN401
-    """Fill in success and data; a failure, for which there is no field, is logged."""
+    """Fill in success and data; log a failure, as the response has no field for it."""
     answer_success(node, response, future)
     if response.success:
         response.data = future.result()
@@ -305,7 +304,7 @@ def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa:
 
 
 def answer_success(node: Node, response: Any, future: Future[Any]) -> Any:  # noqa: ANN401
-    """Fill in success, of a write or another command; a failure, which has no field, is logged."""
+    """Fill in success of a command; log a failure, as the response has no field for it."""
     error = future.exception()
     response.success = error is None
     if isinstance(error, (CanopenError, SdoError)):
@@ -316,7 +315,7 @@ def answer_success(node: Node, response: Any, future: Future[Any]) -> Any:  # no
 
 
 def _require_clear(path: str) -> None:
-    """Refuse decimal digits: where 0x2003 is not quoted, YAML makes 8195 of it."""
+    """Reject decimal digits: YAML turns an unquoted 0x2003 into 8195."""
     digits = path.strip().partition(':')[0]
     if digits.isdecimal():
         number = f'0x{int(digits):X}'
@@ -330,10 +329,10 @@ RAW_BYTES = 4  # [byte] in COData, CORead and COWrite
 
 
 def raw_from_bytes(data: bytes) -> int:
-    """Return up to four bytes as they are, zero-extended.
+    """Return up to four bytes as a number, zero-extended.
 
     Raises:
-        CodecError: There are more; the message has no room for them.
+        CodecError: There are more than four bytes, which the message cannot carry.
     """
     if len(data) > RAW_BYTES:
         raise CodecError(f'the object has {len(data)} bytes, more than the 4 of this message')
@@ -341,7 +340,7 @@ def raw_from_bytes(data: bytes) -> int:
 
 
 def bytes_from_raw(data_type: DataType, raw: int) -> bytes:
-    """Return the bytes of an object from the 32 bits of a message.
+    """Convert the 32 bits of a message to the bytes of an object.
 
     A negative number may come zero-extended to its type or sign-extended to 32 bits.
 
@@ -359,18 +358,18 @@ def bytes_from_raw(data_type: DataType, raw: int) -> bytes:
 
 
 def _narrowed(data_type: DataType, bits: int, raw: int) -> int:
-    """Cut a negative number that was sign-extended to 32 bits down to those of its type."""
+    """Truncate a negative number that was sign-extended to 32 bits to the width of its type."""
     negative = raw >> (bits - 1) == (1 << (33 - bits)) - 1 if bits <= 32 else False
     return raw & ((1 << bits) - 1) if negative and data_type in SIGNED_BITS else raw
 
 
 def raw_from_number(mapped: MappedObject, value: Number) -> int:
-    """Return a value of a PDO as the 32 bits of a message, cut off if it has more."""
+    """Return a PDO value as the 32 bits of a message; truncate a wider one."""
     return int.from_bytes(PdoCodec([mapped]).pack([value])[:RAW_BYTES], 'little')
 
 
 def number_from_raw(mapped: MappedObject, raw: int) -> Number:
-    """Return the value of a mapped object from the 32 bits of a message.
+    """Convert the 32 bits of a message to the value of a mapped object.
 
     A negative number may come zero-extended to its type or sign-extended to 32 bits.
 

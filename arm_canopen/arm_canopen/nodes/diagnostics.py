@@ -25,7 +25,7 @@ HIGH_LOAD = 0.7  # share of the bus time above which low-priority frames begin t
 
 
 class DiagnosticsPublisher:
-    """``diagnostics`` of a bus, published by the output thread."""
+    """Publishes ``diagnostics`` of a bus in the output thread."""
 
     def __init__(self, node: Node, output: OutputThread) -> None:
         self._node = node
@@ -33,7 +33,7 @@ class DiagnosticsPublisher:
         self._publisher = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
 
     def post(self, statuses: list[DiagnosticStatus]) -> None:
-        """Publish them soon; of those that wait only the newest."""
+        """Queue statuses for publishing; they replace older ones that are still queued."""
         self._output.post_stream('diagnostics', partial(self._publish, statuses))
 
     def _publish(self, statuses: list[DiagnosticStatus]) -> None:
@@ -55,10 +55,10 @@ def bus_diagnostics(
     recording: Callable[[str], str],
     io: Mapping[str, dict[str, str]] = MappingProxyType({}),
 ) -> list[DiagnosticStatus]:
-    """Describe a bus with its cycle, each device that is no drive, and each axis of the others.
+    """Return the status of the bus and its cycle, of each non-drive device and each drive axis.
 
-    ``recording`` returns the last file of the black box with a fault of a device, of any for an
-    empty name; empty before one. ``io`` has what I/O modules and encoders show, by device.
+    ``recording`` returns the latest black-box file of a device's fault (of any device for an empty
+    name), or an empty text. ``io`` holds values of I/O modules and encoders, by device.
     """
     controller = network.controller
     level, message = _bus_level(controller, counters, load)
@@ -107,10 +107,10 @@ def bus_diagnostics(
 def device_diagnostic(
     bus: str, status: NodeStatus, recording: str = '', io: dict[str, str] | None = None
 ) -> DiagnosticStatus:
-    """Describe a device that is no drive.
+    """Return the status of a device that is no drive.
 
-    ``recording`` is the last file of the black box with a fault of it, empty before one; ``io``
-    is what an I/O module or an encoder shows.
+    ``recording`` is the latest black-box file of a fault of the device, empty without one; ``io``
+    holds the values of an I/O module or encoder.
     """
     io = io or {}
     level, message = _device_level(status)
@@ -126,7 +126,7 @@ def device_diagnostic(
 
 
 def drive_diagnostic(bus: str, status: DriveStatus, recording: str = '') -> DiagnosticStatus:
-    """Describe a drive; arguments as of :func:`device_diagnostic`."""
+    """Return the status of a drive; arguments as for :func:`device_diagnostic`."""
     level, message = _device_level(status.node)
     if level in (DiagnosticStatus.OK, DiagnosticStatus.WARN):
         message = status.summary

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics and services of I/O modules (CiA 401) and encoders (CiA 406) that have no other driver.
 
-Digital channels are std_msgs/UInt8MultiArray with 0 or 1 for each line, analogue ones
-std_msgs/Float64MultiArray in counts of the device: types that every client has, short enough for
-`ros2 topic pub`. Both have the channels that PDOs carry, in the order of their sub-indices.
+Digital channels use std_msgs/UInt8MultiArray with 0 or 1 per line, analogue ones
+std_msgs/Float64MultiArray in device counts: every client has these types, and they are short in
+`ros2 topic pub`. Both list the PDO-mapped channels in the order of their sub-indices.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from .joint_state_publisher import DriveJointStates, EncoderState
 
 
 class Channels:
-    """The channels of one kind that PDOs carry."""
+    """PDO-mapped channels of one kind."""
 
     def __init__(self, device: RemoteNode, group: IoGroup) -> None:
         places = {
@@ -65,27 +65,27 @@ class Channels:
         self.readers: list[InputReader] = [each for each in readers if each is not None]
 
     def received(self) -> list[Number] | None:
-        """Return a value for each input; None while one is unknown."""
+        """Return the value of each input; None while any is unknown."""
         values = [reader.value for reader in self.readers]
         return None if None in values else self._split([value or 0 for value in values])
 
     @property
     def missing(self) -> str:
-        """The TPDOs without which the inputs are unknown, in words; empty where they are known."""
+        """Describe the missing TPDOs that leave inputs unknown; empty when all are known."""
         silent = {r.source.config.number for r in self.readers if r.source.values is None}
         numbers = ', '.join(map(str, sorted(silent)))
         return f'unknown: TPDO {numbers} not received since the boot' if silent else ''
 
     def commanded(self) -> list[Number] | None:
-        """Return a value for each output; None while nothing was sent since the device booted."""
+        """Return the last value sent to each output; None if nothing was sent since it booted."""
         outputs = [self._device.image.sent(*entry.address) for entry in self.entries]
         return None if None in outputs else self._split([value or 0 for value in outputs])
 
     def packed(self, data: Sequence[Number]) -> Mapping[tuple[int, int], Number]:
-        """Return the values of the objects for a value of each output.
+        """Return the object values that set every output to its value in ``data``.
 
         Raises:
-            CodecError: The number of values is wrong, or an output cannot have one of them.
+            CodecError: The number of values is wrong, or a value does not fit its output.
         """
         if len(data) != sum(self._lines):
             word = '0 or 1' if self.group.is_digital else 'in counts of the device'
@@ -118,9 +118,9 @@ LOOKS = 2  # looks in a row at which inputs that are unknown are logged
 
 
 class IoTopics:
-    """``~/digital_inputs``, ``~/analog_inputs`` and, to be written, both kinds of outputs.
+    """Topics ``~/digital_inputs`` and ``~/analog_inputs``, and topics that write outputs.
 
-    Inputs are latched, and published when one changes.
+    Input topics are latched and published on change.
     """
 
     def __init__(self, node: DeviceNode) -> None:
@@ -132,9 +132,9 @@ class IoTopics:
             self._offer(channels)
 
     def diagnostics(self) -> dict[str, str]:
-        """Return the inputs, the outputs, and what these do when the master is lost.
+        """Return inputs, outputs, and how outputs react to the loss of the master.
 
-        Inputs that stay unknown are logged once: their topic is silent.
+        Inputs that stay unknown are logged once: nothing is published for them.
         """
         values = {}
         for channels in self._channels:
@@ -184,7 +184,7 @@ class IoTopics:
 
 
 def outputs_on_loss(config: NodeConfig, outputs: Sequence[ObjectEntry]) -> str:
-    """Return in words what outputs do when their device loses the master, by bus.yml and EDS."""
+    """Describe how outputs react to the loss of the master, from bus.yml and EDS."""
     if not (config.heartbeat_consumer or config.life_guarding):
         return 'kept: the device does not watch the master (0x1016)'
     parts = []
@@ -215,7 +215,7 @@ class EncoderTopics:
         node.offer(COTargetDouble, '~/preset', self._preset, partial(answer_success, node))
 
     def diagnostics(self) -> dict[str, str]:
-        """Return position and velocity."""
+        """Return position and velocity as diagnostic values."""
         state = self._state
         return {'position': f'{state.position:.6f}', 'velocity': f'{state.velocity:.6f}'}
 
@@ -236,7 +236,7 @@ class EncoderTopics:
 
 
 def offer_io(node: DeviceNode, thread: NetworkThread) -> IoTopics | EncoderTopics | None:
-    """Offer what the profile of a device in 0x1000 has; None for other profiles and drives."""
+    """Create the topics of the device profile in 0x1000; None for drives and other profiles."""
     config = node.device.config
     profile = 0 if config.is_drive else profile_number(config.dictionary)
     if profile == DeviceProfile.GENERIC_IO:

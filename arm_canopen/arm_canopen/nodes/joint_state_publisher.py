@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint states of drives and of the robot that they move, stamped with their SYNC.
+"""Publishes joint states of drives and of their robot, stamped with the time of the SYNC.
 
-``ros2 run arm_canopen canopen_joint_state_publisher`` puts those of several masters together.
+``ros2 run arm_canopen canopen_joint_state_publisher`` merges those of several masters.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class EncoderState:
 
     @property
     def fresh(self) -> bool:
-        """Whether the position is young enough to be published."""
+        """Whether the position is recent enough to be published."""
         reader = self._position
         return (
             self._device.online
@@ -85,7 +85,7 @@ def _value(reader: InputReader | None) -> float:
 
 
 class DriveJointStates:
-    """``~/joint_states`` of a drive, and of each of its channels where it has several."""
+    """Publishes ``~/joint_states`` of a drive, and those of each channel if it has several."""
 
     def __init__(self, node: Node, axes: Sequence[AxisState | EncoderState]) -> None:
         self.axes = list(axes)  # the state of each axis
@@ -121,7 +121,7 @@ class DriveJointStates:
 
 
 class RobotJointStates:
-    """``joint_states`` of a robot, put together from those of its drives."""
+    """Publishes ``joint_states`` of a robot, merged from those of its drives."""
 
     def __init__(self, node: Node, joints: Joints) -> None:
         self.aggregator = JointAggregator(joints)  # the joints
@@ -130,7 +130,7 @@ class RobotJointStates:
         self._publisher = node.create_publisher(JointState, 'joint_states', 10)
 
     def set_joints(self, joints: Joints) -> None:
-        """Begin anew with other joints, or the same in another order."""
+        """Restart with other joints, or with the same in another order."""
         self.aggregator = JointAggregator(joints)
 
     def update_listeners(self) -> None:
@@ -138,7 +138,7 @@ class RobotJointStates:
         self.listened = self._publisher.get_subscription_count() > 0
 
     def update(self, joint: str, stamp: int, sample: JointSample) -> None:
-        """Store the state of a joint at a time in [ns], and publish what is complete."""
+        """Store a joint sample with its stamp in [ns], and publish each complete set."""
         for ready in self.aggregator.update(joint, stamp, sample, time.monotonic()):
             if ready.samples:
                 self._publish(ready)
@@ -154,7 +154,7 @@ class RobotJointStates:
 
 
 class BusJointStates:
-    """The joint states of a bus: sampled in the cycle, published by the output thread."""
+    """Samples the joint states of a bus in the cycle; the output thread publishes them."""
 
     def __init__(
         self, node: Node, drives: Sequence[DriveJointStates], output: OutputThread
@@ -166,10 +166,10 @@ class BusJointStates:
         self._posted = False
 
     def publish_robot(self, description: str) -> None:
-        """Publish ``joint_states``, too: all axes of the bus, and the joints that mimic them.
+        """Also publish ``joint_states`` of all axes of the bus and the joints that mimic them.
 
-        By a URDF in XML, or by the topic ``robot_description``. Until it comes, the joints are
-        those of bus.yml in its order; so they stay where it has none of them.
+        The description is a URDF in XML, or comes from the topic ``robot_description``. Until
+        then, and if it has none of the joints, they are those of bus.yml in its order.
         """
         own = [axis.name for drive in self._drives for axis in drive.axes]
         robot = RobotJointStates(self._node, dict.fromkeys(own))
@@ -199,7 +199,7 @@ class BusJointStates:
         self._robot = robot
 
     def update_listeners(self) -> None:
-        """Check for subscribers, so that only what is received is published."""
+        """Check which topics have subscribers; the others are not published."""
         for drive in self._drives:
             drive.update_listeners()
         if self._robot is not None:
@@ -235,9 +235,9 @@ class BusJointStates:
 
 
 def on_description(node: Node, text: str, begin: Callable[[Joints], None]) -> None:
-    """Call ``begin`` once with the movable joints of the robot.
+    """Call ``begin`` once with the movable joints of the robot description.
 
-    Of a URDF in XML, or of the topic ``robot_description``.
+    The description is ``text`` (URDF in XML), or comes from the topic ``robot_description``.
 
     Raises:
         CanopenError: The text is no URDF.
@@ -270,14 +270,14 @@ WATCH_PERIOD = 2.0  # [s] between two looks for joints without states
 
 
 class JointStatePublisher(Node):
-    """Subscribes ``/<joint>/joint_states`` of all joints and publishes ``/joint_states``."""
+    """Subscribes to ``/<joint>/joint_states`` of all joints and publishes ``/joint_states``."""
 
     @destroyed_when_refused
     def __init__(self) -> None:
         """Read the robot description and subscribe.
 
         Raises:
-            ParameterError: A parameter is misspelt, or no text.
+            ParameterError: A parameter is misspelt or has the wrong type.
             CanopenError: The robot description is no URDF.
         """
         super().__init__('canopen_joint_state_publisher')

@@ -44,13 +44,13 @@ def manage_bus(
     thread: NetworkThread,
     output: OutputThread,
 ) -> tuple[Node, Callable[[], None]]:
-    """Give a master and its devices a lifecycle.
+    """Create the lifecycle services of a master and its devices.
 
-    A device that is not active takes no commands. Deactivating a drive stops and disables it.
+    A device that is not active rejects commands. Deactivating a drive stops and disables it.
 
     Returns:
-        The node ``lifecycle_manager``, in the namespace of the master, and what lets a request to
-        the master pass.
+        The node ``lifecycle_manager``, in the namespace of the master, and the check that every
+        request to the master must pass.
     """
     master = Managed(node.get_name(), _nothing)
     LifecycleServices(node, master, thread, output)
@@ -91,7 +91,7 @@ async def _nothing(verb: Verb) -> None:
 
 
 class LifecycleServices:
-    """What makes a node a managed one."""
+    """Lifecycle services of a managed node."""
 
     def __init__(
         self, node: Node, managed: Managed, thread: NetworkThread, output: OutputThread

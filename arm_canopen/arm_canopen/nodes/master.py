@@ -78,11 +78,11 @@ def run_master(
         args: Command line; None for the process's own.
         extend: Called with the process of each bus before it starts; returns further nodes for
             the executor, which may attach motion sources.
-        errors: What it may raise then, to be logged in one line.
+        errors: Exceptions of ``extend`` that are logged in one line.
 
     Returns:
-        Exit code: 0, or 1 when the bus could not be configured or opened, has a master, or its
-        cycle has ended by a defect.
+        Exit code: 0, or 1 if the bus could not be configured or opened, already has a master, or a
+        defect ended its cycle.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     return run_program(
@@ -102,7 +102,7 @@ def main() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters of the program; :data:`HELP` says what they are."""
+    """Parameters of the program; :data:`HELP` describes them."""
 
     bus_configs: list[str]  # one for each bus
     can_names: list[str]  # in the same order
@@ -115,13 +115,13 @@ class Parameters:
 
 
 def serve_buses(stop: threading.Event, extend: Extend | None = None) -> None:
-    """Run the buses that the parameters name, in a program that has begun, until ``stop`` ends it.
+    """Run the buses that the parameters name until ``stop`` is set; ROS is already initialised.
 
-    Then all drives are stopped and disabled; ``extend`` as of :func:`run_master`.
+    Then stop and disable all drives; ``extend`` as for :func:`run_master`.
 
     Raises:
-        CanopenError: A bus could not be configured or opened, has a master, or its cycle has
-            ended by a defect.
+        CanopenError: A bus could not be configured or opened, already has a master, or a defect
+            ended its cycle.
     """
     first = Node('master')
     try:
@@ -190,7 +190,7 @@ def _serve(
 
 
 def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
-    """Stop the drives; meanwhile the other nodes end the goals and requests of their clients."""
+    """Stop the drives while the other nodes end the goals and requests of their clients."""
     stopped = threading.Event()
 
     def stop() -> None:
@@ -208,7 +208,7 @@ def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
 
 
 def _check_names(configs: Sequence[BusConfig], named: str) -> None:
-    """Refuse two nodes of one name, which would answer each other's services.
+    """Reject duplicate node names: such nodes would answer each other's services.
 
     ``named`` is the namespace that the command line gives to all nodes; empty for none.
     """

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One bus in one process: network, drives and all their ROS nodes.
 
-The node of the master has SDO and NMT to any node id, and ``stop``: one service that stops the
+The master's node offers SDO and NMT for any node id, and the service ``stop``, which stops the
 robot, whatever moves it.
 """
 
@@ -70,12 +70,12 @@ SERVICE_TYPES = (
 
 SERVICE = 'stop'
 EVENT_TOPIC, STOP_EVENT = 'trajectory_execution_event', 'stop'
-"""By which MoveIt's move_group, or ours, gives up what it executes, and what it was to execute."""
+"""Topic and message that make MoveIt's move_group, or ours, drop running and queued executions."""
 SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not exist
 
 
 class MasterServices:
-    """Services of the master node; ``stop`` is there at any time, also while devices boot."""
+    """Services of the master node; ``stop`` is always available, even while devices boot."""
 
     def __init__(
         self,
@@ -195,7 +195,7 @@ class MasterProcess:
         beside_master: bool = False,
         black_box: BlackBoxSettings | None = None,
     ) -> None:
-        """Nothing is sent before :meth:`start`; the bus is open, and stays the caller's to close.
+        """Prepare without sending; the caller has opened ``can`` and closes it.
 
         The ``diagnostics_period`` is in [s].
         """
@@ -248,7 +248,8 @@ class MasterProcess:
         """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Raises:
-            OtherMasterError: There is one, or that is not known, and beside_master is not set.
+            OtherMasterError: Another master was found or cannot be ruled out, and beside_master is
+                not set.
         """
         if other := self._master.listen():
             self._node.get_logger().warning(f'beside_master is set; starting anyway: {other}')
@@ -260,12 +261,12 @@ class MasterProcess:
         self._master.start(lambda: raise_thread_priority(self._node, priority, what))
 
     def end_on_failure(self, stop: threading.Event) -> None:
-        """Set ``stop`` when a defect has ended the cycle; call it before :meth:`start`."""
+        """Set ``stop`` when a defect ends the cycle; call it before :meth:`start`."""
         self._thread.on_failure = stop.set
 
     @property
     def failure(self) -> CanopenError | None:
-        """The defect that has ended the cycle, if any."""
+        """Error of the defect that ended the cycle; None without one."""
         return self._thread.failure
 
     def stop(self) -> None:
@@ -283,9 +284,9 @@ class MasterProcess:
             self._output.stop()
 
     def publish_robot_joint_states(self, description: str) -> None:
-        """Publish ``joint_states`` of all drives of the bus, too; call it before :meth:`start`.
+        """Also publish ``joint_states`` of all drives of the bus; call it before :meth:`start`.
 
-        Order, and which joints mimic others, by a URDF in XML, or the topic ``robot_description``.
+        Joint order and mimic joints come from a URDF in XML or the topic ``robot_description``.
         """
         self._joint_states.publish_robot(description)
 
@@ -317,7 +318,7 @@ class MasterProcess:
         )
 
     def _recording(self, device: str) -> str:
-        """Return the last file of the black box, of a device or of any; empty before one."""
+        """Return the latest black-box file of a device, or of any; empty without one."""
         box = self._master.black_box
         path = None if box is None else box.recording_of(device) if device else box.last
         return '' if path is None else str(path)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One thread that publishes, answers and logs for the cycle, which must not wait for DDS."""
+"""A thread that publishes, responds and logs for the cycle, which must not wait for DDS."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ WAITING_MAX = 1000  # pieces of work from which on only the newest of each strea
 
 
 class OutputThread:
-    """Runs what other threads post, one after another."""
+    """Runs functions that other threads post, one after another."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """``logger`` takes the defects of what was posted, and what had to be left out."""
+        """``logger`` reports exceptions of posted functions, and dropped ones."""
         self._logger = logger
         self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._lock = threading.Lock()
@@ -28,15 +28,15 @@ class OutputThread:
 
     @property
     def waiting(self) -> int:
-        """Number of pieces of work that wait."""
+        """Number of queued functions."""
         return self._queue.qsize()
 
     def start(self) -> None:
-        """Start to work."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Finish what was posted, then end."""
+        """Run all posted functions, then end the thread."""
         self._queue.put(None)
         if self._thread.is_alive():
             self._thread.join()
@@ -44,14 +44,14 @@ class OutputThread:
     def post(self, work: Callable[[], None]) -> None:
         """Queue a function; returns at once.
 
-        For what a client waits for, such as answers of services: it is never left out.
+        Use it for results that a client waits for, such as service responses: none is dropped.
         """
         self._queue.put(work)
 
     def post_stream(self, key: Hashable, work: Callable[[], None]) -> None:
         """Queue a function of a stream; returns at once.
 
-        While ROS takes less than what comes, only the newest of each stream is kept.
+        While ROS is slower than the streams, only the newest function of each is kept.
         """
         with self._lock:
             waits = key in self._newest

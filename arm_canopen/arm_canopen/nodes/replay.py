@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_canopen replay``: a log of a bus as the topics that its master had published."""
+"""``ros2 run arm_canopen replay``: republishes the topics of a master from a log of its bus."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ parameters:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters of the program; :data:`HELP` says what they are."""
+    """Parameters of the program; :data:`HELP` describes them."""
 
     log: Path
     interface: str
@@ -85,7 +85,7 @@ def main() -> int:
 
 
 class ReplayProcess:
-    """The nodes of a bus that is replayed."""
+    """Nodes of a replayed bus."""
 
     def __init__(
         self, node: Node, config: BusConfig, parameters: Parameters, stack: ExitStack
@@ -126,12 +126,12 @@ class ReplayProcess:
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
 
     def play(self, stop: threading.Event) -> None:
-        """Play the log in a thread of its own, and serve the nodes meanwhile.
+        """Play the log in a separate thread, and spin the nodes meanwhile.
 
-        ``stop`` ends it, and is set at the end of the log.
+        Setting ``stop`` ends the replay; the end of the log sets it, too.
 
         Raises:
-            CanopenError: Another node publishes the same meanwhile.
+            CanopenError: Another node publishes the same topics meanwhile.
             PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_master, stop))
@@ -224,7 +224,7 @@ def _serve(stop: threading.Event) -> None:
 
 
 def _published_by(node: Node, config: BusConfig) -> set[str]:
-    """Return the nodes that publish what a replay of this bus publishes."""
+    """Return the nodes that publish the topics of a replay of this bus."""
     here = node.get_namespace().rstrip('/')
     # __ns of the command line goes before the namespaces of bus.yml
     moved = here != f'/{config.master.namespace.strip("/")}'.rstrip('/')
