@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What setup.py of every Python package has in common; each runs this file.
+"""Common part of all setup.py files; each runs this file.
 
-colcon links setup.py into its build folder, and pip builds in a place without our packages, so
+colcon links setup.py into its build folder, and pip builds in a folder without our packages, so
 setup.py finds this file by its own resolved path.
 """
 
@@ -42,7 +42,7 @@ REQUIREMENTS: Mapping[str, Sequence[str]] = {
     'python3-zstandard': ['zstandard>=0.21'],
     'xacro': ['xacro>=2'],
 }
-"""What pip installs for each key of rosdep that package.xml names."""
+"""The pip requirements of each rosdep key in our package.xml files."""
 
 
 def setup_package(
@@ -56,17 +56,17 @@ def setup_package(
 ) -> None:
     """Describe the package whose package.xml is in the working directory.
 
-    That has name, texts and dependencies: pip installs what the keys of `exec_depend` stand for,
-    those of ROS left out.
+    It provides name, texts and dependencies: pip installs the packages for the keys of
+    `exec_depend`, without those of ROS.
 
     Args:
-        extras: Keys and names of packages of this checkout, or lines of pip, that are installed
-            with an extra only; `ros` is what its nodes need besides.
-        programs: Entry points of `ros2 run`.
+        extras: Packages by extra: rosdep keys, packages of this checkout, or pip requirements;
+            `ros` has those of the nodes.
+        programs: Entry points for `ros2 run`.
         commands: Entry points that pip installs.
         package_data: Patterns of files beside its modules.
         folders: Patterns of folders whose files are installed in its share folder.
-        entry_points: Other groups.
+        entry_points: Entry points of other groups.
     """
     import setuptools
 
@@ -126,15 +126,15 @@ def _is_for_pip(key: str) -> bool:
 
 
 def _folder(name: str) -> Path | None:
-    """Return where a Python package of this checkout is."""
+    """Return the folder of a Python package of this checkout."""
     places = (CHECKOUT / name, CHECKOUT / 'libraries' / name)
     return next((path for path in places if (path / 'setup.py').is_file()), None)
 
 
 def _requirements(keys: Iterable[str]) -> list[str]:
-    """Require a package of this checkout as it stands here, and never one of that name on PyPI.
+    """Return pip requirements; packages of this checkout by path, never by name from PyPI.
 
-    A wheel is for the machine that built it: it names the folder.
+    So a wheel works only on the machine that built it, as it names the folder.
     """
     lines: list[str] = []
     for key in keys:

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Brings the READMEs of the checkout into the site, each with the links that it has there.
+"""Adds the READMEs of the checkout to the site and keeps their links.
 
-A hook of mkdocs. In the site each page has the place of its file in the checkout, so that a link
-from a page of `docs` to a README, and back, is the same there and here; only the address of what
-lies in `docs` begins at the top.
+A hook of mkdocs. Each page has the path of its file in the checkout, so links between pages of
+`docs` and READMEs work in both; only paths in `docs` start at the root of the site.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ FENCE = re.compile(r'^( *)(```+).*?^\1\2$', re.MULTILINE | re.DOTALL)
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Move the pages of the manual to their place in the checkout, and add the READMEs."""
+    """Move the pages of the manual to their path in the checkout, and add the READMEs."""
     found = Files([])
     for file in files:
         moved = File.generated(
@@ -58,7 +57,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point links to folders to their READMEs; replace those to what the site lacks by text."""
+    """Redirect links from folders to their READMEs; replace links that the site lacks by text."""
     del config
 
     def corrected(match: re.Match[str]) -> str:
@@ -85,13 +84,13 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
 
 def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Remove the roles of Sphinx, which docstrings have."""
+    """Remove the Sphinx roles of docstrings."""
     del page, config, files
     return ROLE.sub('', html)
 
 
 def table_of_programs() -> str:
-    """List the executables of all packages, with the first sentence of their docstrings."""
+    """Return a table of the executables of all packages, with the first docstring sentence."""
     rows = ['| package | program | what it is |', '|---|---|---|']
     for setup in sorted([*ROOT.glob('*/setup.py'), *ROOT.glob('libraries/*/setup.py')]):
         package = setup.parent
@@ -103,7 +102,7 @@ def table_of_programs() -> str:
 
 
 def table_of_interfaces() -> str:
-    """List the messages, services and actions of this workspace, with their first comment."""
+    """Return a table of the messages, services and actions here, with their first comment."""
     rows = ['| type | what it is |', '|---|---|']
     for path in sorted(ROOT.glob('*_msgs/*/*')):
         if path.suffix in {'.msg', '.srv', '.action'}:
@@ -129,7 +128,7 @@ def _executables(setup: Path) -> list[tuple[str, str, str]]:
 
 
 def _summary(package: Path, module: str, function: str) -> str:
-    """Return the first sentence of a program's module, or of its function in a shared one."""
+    """Return the first docstring sentence of a program's module, or of its function."""
     base = package.joinpath(*module.split('.'))
     path = base / '__init__.py' if base.is_dir() else base.with_suffix('.py')
     tree = ast.parse(path.read_text(encoding='utf-8'))
@@ -144,7 +143,7 @@ def _summary(package: Path, module: str, function: str) -> str:
 
 
 def _linked(files: Files) -> set[str]:
-    """List files of the checkout, no pages, that pages link to."""
+    """List files of the checkout that pages link to and that are no pages."""
     linked = set()
     for file in files.documentation_pages():
         for _, target in LINK.findall(FENCE.sub('', file.content_string)):

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the set-up with a Python that can run it and that no virtual environment hides.
+"""Starts the set-up with a supported Python outside of any virtual environment.
 
-This file alone must be readable for any Python 3, so that an old one gets a message and not a
-traceback.
+Only this file must parse in any Python 3, so that an old one prints a message, not a traceback.
 """
 
 import os
@@ -16,7 +15,7 @@ NEWEST = (3, 14)
 
 
 def _works(path: str) -> bool:
-    """Return whether a candidate is a supported Python and not an empty shim."""
+    """Return whether a candidate is a supported Python, not a broken shim."""
     code = f'import sys; sys.exit(not {OLDEST} <= sys.version_info[:2] <= {NEWEST})'
     try:
         return subprocess.call([path, '-c', code], stderr=subprocess.DEVNULL) == 0
@@ -34,7 +33,7 @@ def _another() -> str:
 
 
 def _better_interpreter() -> str:
-    """Name the interpreter that should run the set-up instead of this one; empty for none."""
+    """Return the interpreter that should run the set-up instead of this one; empty for none."""
     if sys.prefix != sys.base_prefix:
         base = getattr(sys, '_base_executable', sys.executable)
         if base == sys.executable:  # before Python 3.11
@@ -45,7 +44,7 @@ def _better_interpreter() -> str:
 
 
 def _start() -> int:
-    """Run the set-up here, or in the Python that fits it."""
+    """Run the set-up in this Python, or in a better one."""
     if not sys.platform.startswith('linux'):
         sys.stderr.write('error: ROS 2 Jazzy has no packages for %s.\n' % sys.platform)  # noqa: UP031
         sys.stderr.write(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Builds what has changed, and only that: by colcon on a system's ROS, by itself on wheels."""
+"""Builds only changed packages: by colcon on a system's ROS, by itself on wheels."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from .underlay import UnderlayKind
 PACKAGES_AT_A_TIME = 2
 STAMP = '.workspace-fingerprint'
 COLCON_LAYOUT = '.colcon_install_layout'
-"""File in which colcon notes whether packages share one prefix; ours on wheels do."""
+"""File in which colcon records whether packages share one prefix; ours on wheels do."""
 _NEWS = ('Starting >>>', 'Finished <<<', 'Failed')
 
 
 def default_jobs() -> int:
-    """Return a compiler a core, and not more than one for each GiB of memory."""
+    """Return one job per core, but at most one per GiB of memory."""
     memory = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') // 2**30
     return max(1, min(len(os.sched_getaffinity(0)), memory))
 
 
 @dataclass(frozen=True, slots=True)
 class Builder:
-    """Knows what colcon's folders hold, and brings them up to date."""
+    """Tracks the contents of colcon's folders, and updates them."""
 
     layout: Layout  # where things are
     base: str  # fingerprint of the environment that the packages are built in
@@ -44,7 +44,7 @@ class Builder:
         return self.kind is UnderlayKind.WHEELS
 
     def fingerprints(self, packages: Mapping[str, Package]) -> dict[str, str]:
-        """Hash each package with the environment and with the interfaces that it is built on."""
+        """Hash each package with the environment and the interfaces that it is built on."""
         hashes: dict[str, str] = {}
         for name, package in packages.items():
             tools = [interfaces if package.is_interface else link] if self._on_wheels else []
@@ -58,12 +58,12 @@ class Builder:
         return hashes
 
     def stale(self, hashes: Mapping[str, str]) -> list[str]:
-        """Name the packages that are not built, or built from something else."""
+        """Return the packages that are not built, or built from other sources."""
         whole = (self.layout.install / 'local_setup.bash').is_file() and self._has_our_layout()
         return [name for name, value in hashes.items() if not whole or self._built(name) != value]
 
     def _has_our_layout(self) -> bool:
-        """Return whether packages were installed as they are where ROS comes from there."""
+        """Return whether the install layout is the one for this kind of ROS."""
         path = self.layout.install / COLCON_LAYOUT
         layout = path.read_text(encoding='utf-8').strip() if path.is_file() else ''
         return (layout == 'merged') == self._on_wheels
@@ -83,7 +83,7 @@ class Builder:
         return base, value
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove what was built of packages."""
+        """Remove the build results of packages."""
         install = self.layout.install
         for name in names:
             # the build folder first: it holds the stamp
@@ -107,7 +107,7 @@ class Builder:
                     path.unlink(missing_ok=True)
 
     def leftovers(self, wanted: Iterable[str]) -> list[str]:
-        """Name what is installed and not among the packages that are wanted."""
+        """Return installed packages that are not wanted."""
         keep = set(wanted)
         prefixes = '' if self._on_wheels else '*/'
         marks = self.layout.install.glob(f'{prefixes}share/ament_index/resource_index/packages/*')
@@ -118,10 +118,10 @@ class Builder:
         )
 
     def build(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
-        """Build the stale ones of packages from nothing; each stands after those that it needs.
+        """Build the stale packages from scratch; each follows its dependencies.
 
         Raises:
-            WorkspaceError: One of them does not build; the others keep their result.
+            WorkspaceError: A package does not build; the others keep their result.
         """
         hashes = self.fingerprints(packages)
         if not self._has_our_layout():

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands behind the Makefile.
 
-Those that set up plan the steps from what is there to what is wanted, and announce each.
+Set-up commands plan the steps from the present to the wanted state, and announce each.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .underlay import find_underlay
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a target needs."""
+    """Requirements of a target."""
 
     dev: bool = False  # whether the tools for testing, and all that any package imports
     build: bool = True  # whether any package
@@ -39,7 +39,7 @@ class Target:
 
 
 def plan(environment: Environment, target: Target) -> list[Step]:
-    """List the steps from what is there to what is wanted."""
+    """List the steps from the present state to that of the target."""
     layout = environment.layout
     found = find_packages(layout.root)
     packages = needed_packages(found, target.packages, environment.underlay, tests=target.dev)
@@ -68,7 +68,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
 
 
 def carry_out(steps: Sequence[Step], runner: Runner) -> None:
-    """Do the steps, each announced and timed."""
+    """Execute the steps; announce and time each."""
     begin = time.monotonic()
     for number, step in enumerate(steps, 1):
         head = f'[{number}/{len(steps)}] {step.title}'
@@ -85,7 +85,7 @@ BASE = ('uv', 'ros-wheels', 'apt')
 
 
 def pinned_names(requirements: Path) -> list[str]:
-    """List the files to pin: the base, then what is constrained by its versions."""
+    """List the files to pin: the base first, then those that its versions constrain."""
     found = sorted(path.stem for path in requirements.glob('*.in'))
     return [*BASE, *(name for name in found if name not in {*BASE, COMMON})]
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the virtual environment, step by step, so that an unfinished one is seen and replaced."""
+"""Creates the virtual environment in steps, so that an unfinished one is detected and replaced."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NEWS = ('Downloading', 'Prepared', 'Installed', 'Building')
 
 
 class Step(NamedTuple):
-    """One thing to do, and what a person reads meanwhile."""
+    """One step of the set-up, with the text shown meanwhile."""
 
     title: str
     run: Callable[[Runner], None]
@@ -44,7 +44,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """The virtual environment as it should be."""
+    """The desired virtual environment."""
 
     layout: Layout  # where things are
     underlay: Underlay  # the ROS below the workspace
@@ -52,12 +52,12 @@ class Environment:
 
     @property
     def requirements(self) -> Path:
-        """The pinned requirements of the chosen way to have ROS."""
+        """The pinned requirements for the chosen kind of ROS."""
         return self.layout.requirements / REQUIREMENTS[self.underlay.kind]
 
     @property
     def base(self) -> str:
-        """Fingerprint of what every target needs."""
+        """Fingerprint of the requirements of every target."""
         files = (
             self.requirements,
             self.layout.requirements / 'uv.txt',
@@ -69,11 +69,11 @@ class Environment:
         return fingerprint(*ros, python, str(self.layout.venv), fingerprint_files(files))
 
     def steps(self, state: EnvironmentState | None, names: Iterable[str]) -> list[Step]:
-        """Return the steps that are left to do, none if the environment is complete.
+        """Return the remaining steps; none if the environment is complete.
 
-        Each change deletes the state file first, so after an interrupted change everything is
-        made anew. ``names`` are additions to the base: `DEV`, `DOCS`, and packages (those without
-        a requirements file add nothing).
+        Each change deletes the state file first, so an interrupted one makes the next start anew.
+        ``names`` are additions to the base: `DEV`, `DOCS`, and packages (those without a
+        requirements file add nothing).
         """
         fresh = state is not None and state.base == self.base
         there = state.additions if fresh and state is not None else {}
@@ -88,7 +88,7 @@ class Environment:
         return steps
 
     def _additions(self, names: Iterable[str]) -> dict[str, str]:
-        """Fingerprint the requirements files that stand beside the base, by name."""
+        """Fingerprint the additional requirements files, by name."""
         paths = {name: self.layout.requirements / f'{name}.txt' for name in names}
         return {name: fingerprint_files((path,)) for name, path in paths.items() if path.is_file()}
 
@@ -112,7 +112,7 @@ class Environment:
             self._reach_for_packages(runner)
 
     def _reach_for_packages(self, runner: Runner) -> None:
-        """Keep an environment that works while the packages of the new one cannot be reached."""
+        """Keep a working environment while the packages of the new one are unreachable."""
         # only a missing network counts: that the old tools fail is no reason to keep them
         with contextlib.suppress(StepFailedError):
             self._pip(runner, 'download', '--dest', self.layout.venv / '.download')
@@ -188,7 +188,7 @@ _UV_VARIABLES = {
 def uv_settings(environ: Mapping[str, str], python: Path) -> dict[str, str]:
     """Translate pip's index and certificate (pip.conf, PIP_INDEX_URL) for uv, which reads neither.
 
-    Settings that uv has in `environ` count more; `python` is an interpreter with pip.
+    uv's own settings in `environ` override them; `python` is an interpreter with pip.
     """
     command: list[Argument] = [python, '-m', 'pip', 'config', 'list']
     clean = clean_environment(environ)
@@ -210,7 +210,7 @@ def uv_settings(environ: Mapping[str, str], python: Path) -> dict[str, str]:
 
 
 def remove_environment(layout: Layout) -> None:
-    """Remove the virtual environment, its owner's mark last."""
+    """Remove the virtual environment, its owner mark last."""
     if not layout.venv.is_dir():
         return
     for entry in layout.venv.iterdir():
@@ -229,11 +229,11 @@ def choose_python(
 ) -> str:
     """Choose the interpreter for the environment; return its path.
 
-    What a person named counts. A system's ROS is built for one Python only; a finished environment
-    keeps its interpreter while that is there; else the running one is taken.
+    In order: the one the user `named`; that of a finished environment, if it exists and fits the
+    ROS; the one that a system's ROS is built for; the running one.
 
     Raises:
-        WorkspaceError: It cannot be started.
+        WorkspaceError: The interpreter cannot be started.
     """
     if named:
         return probe(named).path

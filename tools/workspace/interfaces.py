@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Builds interface packages where ROS comes from wheels; run by the environment's own Python.
+"""Builds interface packages if ROS comes from wheels; run by the environment's own Python.
 
-CMake starts an interpreter for each generator, and each of them parses every interface again; here
-all generators of a package share one process. What they write becomes one library, which bears the
-names of the five that CMake makes as links. rclpy loads the C type supports only, so the C++ ones
-are left out. With a system's ROS, CMake builds the packages, for rosbag2 and rviz2 too.
+CMake starts an interpreter per generator, and each parses every interface again; here all
+generators of a package share one process. Their output becomes one library, with links for the
+names of the five that CMake makes. rclpy loads only the C type supports, so C++ ones are omitted.
+With a system's ROS, CMake builds the packages, for rosbag2 and rviz2 too.
 """
 
 from __future__ import annotations
@@ -43,22 +43,22 @@ GENERATORS: dict[str, tuple[Any, ...]] = {
         ['rosidl_typesupport_c'],
     ),
 }
-"""Module and function of each generator, and what it gets besides its file of arguments."""
+"""Module and function of each generator, and its arguments besides the arguments file."""
 DESCRIPTIONS = 'rosidl_generator_type_description'
 COMPILERS = ('c++', 'g++', 'clang++')
 FILES_TOGETHER = 32
-"""Sources in one translation unit: most of the time goes into reading the same headers."""
+"""Sources per translation unit: most of the time goes into reading the same headers."""
 
 
 class Workshop:
-    """One interface package on its way into an installation.
+    """Builds and installs one interface package.
 
     Attributes:
-        name: Of the package.
-        source: Its folder.
-        work: Folder of what is generated.
-        install: Prefix that it is installed in.
-        prefixes: Where its dependencies are.
+        name: Name of the package.
+        source: Source folder of the package.
+        work: Folder of generated files.
+        install: Prefix of the installation.
+        prefixes: Prefixes of its dependencies.
     """
 
     def __init__(self, name: str, source: Path, build: Path, install: Path) -> None:
@@ -68,7 +68,7 @@ class Workshop:
         self.interfaces = sorted(path.relative_to(source) for path in found)
 
     def output(self, generator: str) -> Path:
-        """Return the folder that a generator writes to, to be named to compilers."""
+        """Return the output folder of a generator, for the compiler options."""
         return self.work / generator
 
     def generate(self) -> None:
@@ -102,7 +102,7 @@ class Workshop:
         return folder / interface.with_suffix('.json')
 
     def _arguments(self, generator: str, **more: object) -> str:
-        """Write what a generator reads, as CMake would."""
+        """Write the input file of a generator, as CMake would."""
         idl = self.output('rosidl_adapter') / self.name
         content = {
             'package_name': self.name,
@@ -123,10 +123,10 @@ class Workshop:
         path.write_text(text.replace('@PROJECT_NAME_UPPER@', self.name.upper()))
 
     def compile(self, jobs: int) -> None:
-        """Make the library.
+        """Compile the library.
 
         Args:
-            jobs: Compilers at the same time.
+            jobs: Number of parallel compilers.
         """
         compiler = next(path for name in COMPILERS if (path := shutil.which(name)))
         folders = [self.output(generator) for generator in GENERATORS]
@@ -162,7 +162,7 @@ class Workshop:
         return self.install / 'lib' / f'lib{self.name}__rosidl.so'
 
     def _units(self) -> Iterator[Path]:
-        """Write the translation units; what describes a type stays alone, by its static names."""
+        """Write the translation units; type descriptions stay separate, for their static names."""
         for generator in GENERATORS:
             found = sorted(self.output(generator).rglob('*.c*'))
             alone = [path for path in found if path.name.endswith('__description.c')]
@@ -176,7 +176,7 @@ class Workshop:
                 yield unit
 
     def place(self) -> None:
-        """Install what was made, and the manifest last: with it the package counts as built."""
+        """Install the results, the manifest last: it marks the package as built."""
         for generator in WITH_HEADERS:
             for header in (self.output(generator) / self.name).rglob('*.h'):
                 path = header.relative_to(self.output(generator))
@@ -213,7 +213,7 @@ class Workshop:
 
 
 def _is_needed(library: Path) -> bool:
-    """Return whether a library may be one that those of interfaces are linked with."""
+    """Return whether interface libraries may have to link with a library."""
     name = library.stem
     return name.endswith(('_c', '_py', '__rosidl')) or name in {'librcutils', 'libfastcdr'}
 
@@ -224,7 +224,7 @@ def _copy(source: Path, target: Path) -> None:
 
 
 def _move(source: Path, target: Path) -> None:
-    """Put a file there whole: packages that are built beside this one link what they find."""
+    """Move a file atomically: packages built in parallel link the files they find."""
     beside = target.with_name(f'{target.name}.new')
     shutil.move(source, beside)
     beside.replace(target)
@@ -237,7 +237,7 @@ def _run(command: Sequence[str | Path]) -> None:
 
 
 def load_generators() -> None:
-    """Import them, and let them share what they parse."""
+    """Import the generators, and make them share parsed interfaces."""
     modules = [
         importlib.import_module(name)
         for name in ('rosidl_pycommon', DESCRIPTIONS, *(name for name, *_ in GENERATORS.values()))
@@ -257,7 +257,7 @@ def load_generators() -> None:
 
 
 def build(workshop: Workshop, jobs: int) -> None:
-    """Build a package from nothing."""
+    """Build a package from scratch."""
     shutil.rmtree(workshop.work, ignore_errors=True)
     workshop.work.mkdir(parents=True)
     workshop.generate()
@@ -268,16 +268,16 @@ def build(workshop: Workshop, jobs: int) -> None:
 def build_all(
     workshops: Mapping[str, Workshop], needs: Mapping[str, Iterable[str]], jobs: int, workers: int
 ) -> list[str]:
-    """Build packages, each in a process of its own that has the generators loaded.
+    """Build packages, each in its own process with the generators already loaded.
 
     Args:
-        workshops: The packages by their name, each after those that it needs.
-        needs: Names of what each package needs.
-        jobs: Compilers at the same time.
-        workers: Packages at the same time.
+        workshops: The packages by name, each after its dependencies.
+        needs: Names of the dependencies of each package.
+        jobs: Number of parallel compilers.
+        workers: Number of packages built in parallel.
 
     Returns:
-        The names of those that could not be built.
+        The names of packages that could not be built.
     """
     load_generators()
     waiting, running = list(workshops), dict[int, str]()
@@ -320,7 +320,7 @@ def _build_and_exit(workshop: Workshop, jobs: int) -> None:
 
 
 def main() -> int:
-    """Build what the only argument names (JSON)."""
+    """Build the packages that the only argument (JSON) names."""
     request = json.loads(sys.argv[1])
     build_folder, install = Path(request['build']), Path(request['install'])
     packages = request['packages']

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where things are in a checkout, what is made there and kept, and what goes wrong with it."""
+"""Paths and state files of a checkout, and the errors of the set-up."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 class WorkspaceError(Exception):
-    """Says what is wrong, and in `remedy`, of one or more lines, what a person can do about it."""
+    """An error of the set-up; `remedy`, of one or more lines, is what the user can do."""
 
     def __init__(self, message: str, remedy: str) -> None:
         super().__init__(message)
@@ -48,7 +48,7 @@ class StepFailedError(WorkspaceError):
 
 
 def fingerprint(*parts: str | bytes) -> str:
-    """Hash parts into one word; the borders between the parts count."""
+    """Hash parts into one word; the boundaries between the parts count."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
@@ -57,7 +57,7 @@ def fingerprint(*parts: str | bytes) -> str:
 
 
 def fingerprint_files(paths: Iterable[Path]) -> str:
-    """Hash names and contents of files; a missing one counts as such."""
+    """Hash names and contents of files; a missing file has a hash of its own."""
     parts: list[str | bytes] = []
     for path in paths:
         parts += [path.name, path.read_bytes() if path.is_file() else b'missing']
@@ -65,9 +65,9 @@ def fingerprint_files(paths: Iterable[Path]) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes, *, mode: int = 0o644) -> None:
-    """Write a file so that a reader sees the old one or the new one and nothing between.
+    """Write a file atomically: readers see either the old or the new content.
 
-    The old file is replaced and not changed in place: installed files may be hard links into a
+    It replaces the old file instead of changing it: installed files may be hard links into a
     cache.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -83,7 +83,7 @@ def write_atomically(path: Path, content: str | bytes, *, mode: int = 0o644) -> 
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentState:
-    """What a finished virtual environment holds."""
+    """Contents of a finished virtual environment."""
 
     base: str  # fingerprint of all that every target needs
     # fingerprint of each further requirements file that was installed, by its name
@@ -111,15 +111,15 @@ class Layout:
         self.venv = root / '.venv'
         self.venv_python = self.venv / 'bin' / 'python'
         self.venv_owner = self.venv / '.made-by-workspace'
-        """Marks the virtual environment as made by us, hence ours to replace."""
+        """Marks the virtual environment as created by us, so we may replace it."""
         self.state = self.venv / '.workspace.json'
-        """What the virtual environment holds; absent while it is being changed."""
+        """Contents of the virtual environment; absent during a change."""
         self.requirements = root / 'tools' / 'requirements'
         self.build = root / 'build'
         self.install = root / 'install'
         self.log = root / 'log'
         self.lock = root / '.workspace.lock'
-        """One set-up at a time holds it locked."""
+        """Lock that only one set-up at a time holds."""
 
 
 def this_checkout() -> Layout:

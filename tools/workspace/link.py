@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Links a Python package into an installation: what `colcon build --symlink-install` does.
+"""Links a Python package into an installation, as `colcon build --symlink-install` does.
 
 colcon starts an interpreter two times for each package, which takes seconds; this takes none.
 """
@@ -39,7 +39,7 @@ def read_setup(folder: Path) -> dict[str, Any]:
     """Return the arguments with which the setup.py of a package calls setuptools.
 
     Raises:
-        WorkspaceError: It ends with an error.
+        WorkspaceError: setup.py ends with an error.
     """
     arguments: dict[str, Any] = {}
     setuptools = ModuleType('setuptools')
@@ -65,7 +65,7 @@ def read_setup(folder: Path) -> dict[str, Any]:
 def _find_packages(
     where: str = '.', exclude: Sequence[str] = (), include: Sequence[str] = ('*',)
 ) -> list[str]:
-    """Find the packages at the top, as setuptools does."""
+    """Find top-level packages, as setuptools does."""
     found = sorted(path.parent.name for path in Path(where).glob('*/__init__.py'))
     return [
         name
@@ -81,10 +81,10 @@ def link_package(package: Package, install: Path, python: Path) -> None:
     Args:
         package: A Python package.
         install: The installation.
-        python: The interpreter of the programs.
+        python: The interpreter for the programs.
 
     Raises:
-        WorkspaceError: Its setup.py ends with an error, or names a file that is not there.
+        WorkspaceError: Its setup.py ends with an error, or names a missing file.
     """
     arguments = read_setup(package.folder)
     manifest = install / 'share' / package.name / 'package.xml'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs every check that reads: style, types, layers, dead code, spelling, containers, manual."""
+"""Runs all static checks: style, types, layers, dead code, spelling, containers, manual."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose S
 
 
 def mkdocs_command(layout: Layout) -> list[str | Path]:
-    """Return the command that builds the site in build/site, a warning being an error."""
+    """Return the command that builds the site in build/site; warnings are errors."""
     mkdocs, settings = layout.venv / 'bin' / 'mkdocs', layout.root / 'mkdocs.yml'
     return [mkdocs, 'build', '--quiet', '--strict', '--config-file', settings]
 
 
 def build_manual(layout: Layout, environ: Mapping[str, str]) -> int:
-    """Build the site and print where it begins; return 0, or 1 when it fails."""
+    """Build the site and print its first page; return 0, or 1 if it fails."""
     environment = clean_environment(environ)
     done = subprocess.run(mkdocs_command(layout), cwd=layout.root, env=environment, check=False)
     if done.returncode:
@@ -56,7 +56,7 @@ def type_check_units(root: Path) -> dict[str, list[Path]]:
 
 
 def lint(layout: Layout, environ: Mapping[str, str]) -> int:
-    """Run all checks side by side, also after one that failed; return 0 when all passed."""
+    """Run all checks in parallel, even after a failure; return 0 if all passed."""
     bin_folder = layout.venv / 'bin'
     packages = [
         package.folder

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The packages of the workspace: what they are, need, and look like at the moment."""
+"""Packages of the workspace: their manifests, dependencies, and fingerprints."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Package:
 
     @property
     def modules(self) -> list[Path]:
-        """The folders of its Python packages; usually one, of its name."""
+        """Folders of its Python packages; usually one, with its name."""
         return [path.parent for path in sorted(self.folder.glob('*/__init__.py'))]
 
 
@@ -77,10 +77,10 @@ def needed_packages(
     *,
     tests: bool = False,
 ) -> dict[str, Package]:
-    """Return the targets, or all, and what they need, each after what it needs itself.
+    """Return the targets (default: all) and their dependencies, in build order.
 
-    Of a public package that the underlay has, our copy is not built. With tests, what these need
-    is there, too.
+    Our copies of public packages that the underlay has are omitted. `tests` adds test
+    dependencies.
 
     Raises:
         WorkspaceError: A target is not in the workspace.
@@ -123,10 +123,10 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def source_fingerprint(package: Package) -> str:
-    """Hash what decides the build's result.
+    """Hash everything that affects the build result.
 
-    Of a Python package the modules and data files are linked, not copied: their contents do not
-    count, but where they are does, and the names of the data files (which setup.py lists).
+    Modules and data files of a Python package are linked, not copied: their contents do not count,
+    but their location does, and the names of data files (which setup.py lists).
     """
     linked = package.build_type == 'ament_python'
     parts: list[str | bytes] = []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the programs of the set-up, and distinguishes a missing network from another failure."""
+"""Runs the programs of the set-up, and distinguishes network from other failures."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ Argument: TypeAlias = str | Path
 
 @contextlib.contextmanager
 def exclusive(path: Path) -> Iterator[int]:
-    """Hold the lock file locked; wait for another holder and print that.
+    """Hold a lock file during the block; wait for another holder and print that.
 
-    The lock goes away with its last holder, however that ends. Programs that are given the
-    descriptor hold it too, so a killed set-up's orphans keep the next one waiting.
+    The lock ends with its last holder, even a killed one. Programs that inherit the descriptor
+    hold it, too, so orphans of a killed set-up make the next one wait.
     """
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
@@ -52,7 +52,7 @@ def exclusive(path: Path) -> Iterator[int]:
 
 
 def clean_environment(environ: Mapping[str, str]) -> dict[str, str]:
-    """Copy an environment without what belongs to another ROS, Python or make."""
+    """Copy an environment without variables of another ROS, Python or make."""
     kept = {name: value for name, value in environ.items() if not _FOREIGN.match(name)}
     own = {'PIP_DISABLE_PIP_VERSION_CHECK': '1', 'PYTHONUNBUFFERED': '1'}
     return {**kept, **own, 'NO_MKDOCS_2_WARNING': '1'}
@@ -74,10 +74,10 @@ class Runner:
         show: tuple[str, ...] = (),
         extra: Mapping[str, str] | None = None,
     ) -> None:
-        """Run a program to its end, and show the lines of its output that begin with `show`.
+        """Run a program to its end; show lines of its output that begin with one of `show`.
 
         Raises:
-            NetworkError: It failed for want of a connection.
+            NetworkError: It failed because there is no connection.
             StepFailedError: It failed for another reason.
         """
         tail: deque[str] = deque(maxlen=TAIL_LINES)

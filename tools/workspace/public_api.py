@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A contract of import-linter: packages meet through what they name."""
+"""A contract of import-linter: packages import only the public modules of others."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from importlinter import Contract, ContractCheck, fields, output
 
 
 class PublicApiContract(Contract):
-    """A package is imported by its name; what is below that is its own, but for families.
+    """Other packages may import only a package itself and its families.
 
     Attributes:
-        families: Modules that packages offer beside themselves; with ``.*`` all modules in them.
+        families: Further public modules of packages; with ``.*`` all modules in them.
     """
 
     families = fields.SetField(subfield=fields.StringField())
@@ -39,6 +39,6 @@ class PublicApiContract(Contract):
         return ContractCheck(kept=not problems, metadata={'problems': problems})
 
     def render_broken_contract(self, check: ContractCheck) -> None:
-        """Name the imports."""
+        """Print the forbidden imports."""
         for problem in check.metadata['problems']:
             output.print_error(problem)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the keys of rosdep for what the environment brings from PyPI.
+"""Prints the rosdep keys of packages that the environment installs from PyPI.
 
-package.xml names the keys, so that `rosdep install` finds everything without this set-up. Beside
-the set-up they are skipped: its versions are pinned, and newer than those of Ubuntu. numpy is that
-of the ROS below.
+package.xml names the keys, so that `rosdep install` works without this set-up. With the set-up
+they are skipped: its versions are pinned, and newer than Ubuntu's. numpy comes from the underlay's
+ROS.
 """
 
 from __future__ import annotations

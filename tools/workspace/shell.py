@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the scripts that bring a shell into the environment."""
+"""Writes the scripts that set up a shell for the environment."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ def _prepend(*pairs: tuple[str, Path]) -> str:
 
 
 def write_setup_scripts(venv: Path, underlay: Underlay, libraries: Sequence[Path]) -> None:
-    """Write `local_setup.*` into the virtual environment, where colcon looks for them too.
+    """Write `local_setup.*` into the virtual environment, where colcon also searches for them.
 
     Args:
         venv: The virtual environment.
-        underlay: The ROS below the workspace.
-        libraries: Folders for the library path, where ROS comes from wheels.
+        underlay: The ROS installation below the workspace.
+        libraries: Folders for the library path, if ROS comes from wheels.
     """
     path = ('PATH', venv / 'bin')
     wheels = [('AMENT_PREFIX_PATH', venv), ('CMAKE_PREFIX_PATH', venv)]
@@ -88,12 +88,12 @@ def write_setup_scripts(venv: Path, underlay: Underlay, libraries: Sequence[Path
 
 
 def write_install_scripts(venv: Path, install: Path, python: Path) -> None:
-    """Write the scripts that colcon would write beside packages.
+    """Write the set-up scripts that colcon would write.
 
     Args:
         venv: The virtual environment.
-        install: Where the packages are, on wheels.
-        python: The folder of their modules.
+        install: The installation prefix, on wheels.
+        python: The folder of the Python modules.
     """
     names = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH')
     folders = (('LD_LIBRARY_PATH', install / 'lib'), ('PYTHONPATH', python))
@@ -106,7 +106,7 @@ def write_install_scripts(venv: Path, install: Path, python: Path) -> None:
 
 
 def write_front_end(venv: Path, underlay: Underlay, folder: Path) -> None:
-    """Put our `ros2`, whose Python package is in a folder, on PATH unless the ROS has its own."""
+    """Put our `ros2`, with its Python package in `folder`, on PATH unless ROS has its own."""
     command = venv / 'bin' / 'ros2'
     if underlay.kind is UnderlayKind.SYSTEM and underlay.has_command('ros2'):
         command.unlink(missing_ok=True)

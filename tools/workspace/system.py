@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the system must have before anything is installed."""
+"""Checks the system requirements before anything is installed."""
 
 from __future__ import annotations
 
@@ -63,17 +63,17 @@ class Interpreter:
 
     @property
     def name(self) -> str:
-        """Its versioned name, `python3.11`."""
+        """Versioned name, such as `python3.11`."""
         return f'python{self.version[0]}.{self.version[1]}'
 
     @property
     def of_the_system(self) -> bool:
-        """Whether it came with the system, so that apt has its parts."""
+        """Whether it belongs to the system, so that apt has its parts."""
         return Path(self.path).parent in {Path('/usr/bin'), Path('/bin')}
 
 
 def probe(program: str) -> Interpreter:
-    """Query an interpreter, by its path or a name on PATH."""
+    """Query an interpreter, by its path or its name on PATH."""
     try:
         answer = subprocess.run(
             [program, '-c', _QUESTIONS], check=True, capture_output=True, text=True
@@ -87,7 +87,7 @@ def probe(program: str) -> Interpreter:
 
 
 def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:
-    """Refuse a machine, a Python or a place of the checkout that no remedy here can help."""
+    """Reject an unsupported machine, Python or checkout location that this set-up cannot fix."""
     if any(character.isspace() for character in str(root)):
         raise WorkspaceError(
             f'The path of the checkout has a space in it: {root}',
@@ -113,7 +113,7 @@ def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None
 
 
 def _python_packages(python: Interpreter) -> list[str]:
-    """Name the apt packages that complete an interpreter; refuse one that apt does not know."""
+    """Return the apt packages that an interpreter needs; reject one unknown to apt."""
     missing = [
         f'{python.name}-{part}'
         for part, present in (('venv', python.has_venv), ('dev', python.has_headers))
@@ -133,7 +133,7 @@ def missing_packages(
     python: Interpreter,
     which: Callable[[str], str | None] = shutil.which,
 ) -> tuple[str, ...]:
-    """Name every apt package that is missing; `which` finds a program on PATH."""
+    """Return all missing apt packages; `which` finds a program on PATH."""
     missing = [package for names, package in PROGRAMS if not any(map(which, names))]
     missing += _python_packages(python)
     if underlay.kind is UnderlayKind.SYSTEM:
@@ -146,7 +146,7 @@ def missing_packages(
 
 
 def check(underlay: Underlay, python: Interpreter, root: Path) -> None:
-    """Refuse a system that lacks something, naming all of it.
+    """Reject a system that lacks requirements; the error names all.
 
     Raises:
         WorkspaceError: It is not supported, or packages have to be installed.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which ROS 2 Jazzy the workspace stands on."""
+"""Finds the ROS 2 Jazzy below the workspace: a system installation or wheels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SYSTEM_PREFIX = '/opt/ros/jazzy'
 
 
 class UnderlayKind(Enum):
-    """The two ways to have ROS."""
+    """Kind of a ROS installation."""
 
     SYSTEM = 'system'  # installed by apt or in a container
     WHEELS = 'wheels'  # Python wheels in the virtual environment
@@ -23,7 +23,7 @@ class UnderlayKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Underlay:
-    """A ROS installation below the workspace; of wheels the prefix is the virtual environment."""
+    """A ROS installation below the workspace; for wheels, `prefix` is the virtual environment."""
 
     kind: UnderlayKind
     prefix: Path
@@ -34,12 +34,12 @@ class Underlay:
         return (index / name).exists()
 
     def has_command(self, name: str) -> bool:
-        """Return whether the installation brings a program."""
+        """Return whether the installation has a program."""
         return (self.prefix / 'bin' / name).exists()
 
     @property
     def python_name(self) -> str | None:
-        """Name of the Python that a system installation is built for; None where any will do."""
+        """Name of the Python that a system installation is built for; None if any works."""
         if self.kind is UnderlayKind.WHEELS:
             return None
         for folder in sorted(self.prefix.glob('lib/python3.*/site-packages/rclpy')):
@@ -50,9 +50,9 @@ class Underlay:
 
     @property
     def python(self) -> str | None:
-        """That Python, by its path beside its ROS or in /usr/bin, else by its name.
+        """That Python: its path beside its ROS or in /usr/bin, else its name.
 
-        One that conda or pyenv put first on PATH lacks the Python packages that apt installed.
+        A Python that conda or pyenv put first on PATH lacks the packages installed by apt.
         """
         name = self.python_name
         if name is None:
@@ -62,9 +62,9 @@ class Underlay:
 
 
 def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
-    """Choose the system's ROS when it is there, else the wheels, which are in `venv`.
+    """Choose the system's ROS if it exists, else the wheels in `venv`.
 
-    `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it stands for the wheels.
+    `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy; if it is empty, the wheels are chosen.
     """
     prefix = environ.get(PREFIX_VARIABLE, SYSTEM_PREFIX)
     if prefix and (Path(prefix) / 'local_setup.bash').is_file():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Patches what the ROS wheels bring from the machine that built them; safe to run again."""
+"""Patches the ROS wheels to fit this machine instead of the one that built them; idempotent."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def patch_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
         numpy_include: Folder of numpy's headers.
 
     Returns:
-        How many files had to be changed.
+        Number of changed files.
     """
     changed = 0
     for path in sorted((prefix / 'share').rglob('*.cmake')):
@@ -89,10 +89,10 @@ def patch_dds(libraries: Path) -> int:
         libraries: The folder of the libraries.
 
     Returns:
-        How many files had to be changed.
+        Number of changed files.
 
     Raises:
-        WorkspaceError: A library is another one than those that this patch was made for.
+        WorkspaceError: A library differs from those that this patch was made for.
     """
     changed = 0
     for path in sorted(libraries.glob(DDS_LIBRARIES)):

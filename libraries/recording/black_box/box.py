@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the data in memory to a folder, some seconds after a fault; plays such a log again."""
+"""Writes the data in memory to a folder, some seconds after a fault, and replays such logs."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ class BlackBoxSettings:
 
     @property
     def pause(self) -> float:
-        """Shortest time between two recordings, so that a repeated fault does not fill the disk.
+        """Minimum time between two recordings, so that a repeated fault does not fill the disk.
 
-        Less than the window: a fault in the pause is in the next recording, with what came before.
+        It is shorter than the window, so the next recording covers a fault during the pause.
         """
         return PAUSE_SHARE * self.window
 
 
 def default_folder(environ: Mapping[str, str] = os.environ) -> Path:
-    """Return the folder ``black_box`` beside the logs of ROS, wherever these go.
+    """Return the folder ``black_box`` in the log directory of ROS.
 
-    That is ROS_LOG_DIR, or ``log`` in ROS_HOME, or ``~/.ros/log``, as rcl_logging has it.
+    As in rcl_logging, that is ROS_LOG_DIR, else ``log`` in ROS_HOME, else ``~/.ros/log``.
     """
     if logs := environ.get('ROS_LOG_DIR'):
         return Path(logs).expanduser() / FOLDER
@@ -64,7 +64,7 @@ _PARTIAL = '.partial'
 logger = logging.getLogger(__name__)
 
 Pause: TypeAlias = Callable[[], None]
-"""Called after each small piece of work; lets other threads have the interpreter."""
+"""Called after each small piece of work, to yield the interpreter to other threads."""
 
 
 class Contents(Protocol):
@@ -72,7 +72,7 @@ class Contents(Protocol):
 
     @property
     def about(self) -> str:
-        """What was recorded, in one or more lines."""
+        """Describe what was recorded, in one or more lines."""
 
     def save(self, folder: Path, pause: Pause) -> Path:
         """Write the recording, in the thread of the black box; return its main file.
@@ -82,7 +82,7 @@ class Contents(Protocol):
         """
 
     def usage(self, path: Path) -> str:
-        """Return the commands, one a line, that show that file."""
+        """Return the commands that show that file, one per line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +99,14 @@ class _Note:
 
 
 class BlackBox:
-    """Writes one folder for each fault, or for several faults that come together.
+    """Writes one folder per fault, or per group of faults that occur together.
 
-    Reporting a fault waits neither for the disk nor for a lock. A disk that is full or
-    a folder that cannot be made is a warning, and harms nothing else.
+    Reporting a fault waits neither for the disk nor for a lock. A full disk, or a folder that
+    cannot be created, only logs a warning.
     """
 
     def __init__(self, name: str, contents: Contents, settings: BlackBoxSettings) -> None:
-        """Write nothing before :meth:`start`; the name stands in those of the folders."""
+        """Write nothing before :meth:`start`; folder names contain ``name``."""
         self.last: Path | None = None  # main file of the last recording; None before the first one
         self._name = re.sub(r'[^A-Za-z0-9.-]+', '_', name).strip('_.') or 'fault'
         self._contents = contents
@@ -119,7 +119,7 @@ class BlackBox:
         self._thread = threading.Thread(target=self._run, name='black box', daemon=True)
 
     def start(self) -> None:
-        """Start its thread."""
+        """Start the thread that writes."""
         self._thread.start()
 
     def close(self) -> None:
@@ -140,7 +140,7 @@ class BlackBox:
         self._faults.put(note)
 
     def recording_of(self, subject: str) -> Path | None:
-        """Return the main file of the last recording of a device's fault; None before one."""
+        """Return the main file of the last recording of a device's fault; None without one."""
         return self._by_subject.get(subject)
 
     def _run(self) -> None:
@@ -165,7 +165,7 @@ class BlackBox:
                 return
 
     def _collect(self, faults: list[_Note], due: float) -> bool:
-        """Wait until a recording is due, and collect faults; return whether it is the last."""
+        """Collect faults until a recording is due; return True if it is the last one."""
         while (left := due - time.monotonic()) > 0.0:
             try:
                 fault = self._faults.get(timeout=left)
@@ -261,20 +261,20 @@ class PlaybackError(ValueError):
 
 
 class Replay(Protocol[Entry_contra]):
-    """The receiver of a log's entries. Times are those of the log in [s] and never go back."""
+    """Receives the entries of a log. Times are those of the log in [s] and never decrease."""
 
     def take(self, entry: Entry_contra, now: float) -> None:
-        """Handle the next entry, which happened now."""
+        """Handle the next entry, which happened at ``now``."""
 
     def advance(self, now: float) -> None:
-        """Advance the time; nothing happened meanwhile."""
+        """Advance the time to ``now`` without an entry."""
 
     def restart(self) -> None:
         """Reset the state, as the log begins again."""
 
 
 class LogPlayer(Generic[Entry]):
-    """Plays a log, once or again and again."""
+    """Plays a log, once or in a loop."""
 
     def __init__(
         self,
@@ -291,8 +291,8 @@ class LogPlayer(Generic[Entry]):
             read: Yields the entries of the log with their times in [s], from the first one.
             name: Name of the log in errors: its file.
             rate: Seconds of the log played per second.
-            start: How far from its beginning it is played in time, in [s]; what comes before is
-                taken at once, so that states are known.
+            start: Offset from its beginning in [s]; earlier entries are handled at once, so that
+                states are known.
         """
         self.seeking = False  # whether the entries lie before the requested start
         # called in the thread of :meth:`play`, some ten times a second at least
@@ -310,10 +310,10 @@ class LogPlayer(Generic[Entry]):
         return self._zero + (log_time - self._log_zero) / self._rate
 
     def play(self, stop: threading.Event, *, loop: bool) -> None:
-        """Play until the end, with ``loop`` again and again, or until stopped.
+        """Play until the end or, with ``loop``, until stopped.
 
         Raises:
-            PlaybackError: It has no entries, or ends before the start.
+            PlaybackError: The log has no entries, or ends before the start.
         """
         shift = 0.0  # of the times of the log, so that they go on in the next turn
         while not stop.is_set():
@@ -324,7 +324,7 @@ class LogPlayer(Generic[Entry]):
             self._replay.restart()
 
     def _play_once(self, stop: threading.Event, shift: float) -> float:
-        """Play it from its first frame, whose time is the shift; return the time of the last."""
+        """Play from the first entry, whose time is ``shift``; return the time of the last one."""
         first: float | None = None
         began = False
         now = shift
@@ -353,7 +353,7 @@ class LogPlayer(Generic[Entry]):
         return now
 
     def _wait(self, log_time: float, stop: threading.Event) -> None:
-        """Wait until a time of the log in [s]; meanwhile time passes for what is missing."""
+        """Wait until a time of the log in [s]; advance the replay, so that it detects silence."""
         due = self.steady(log_time)
         while (left := due - time.monotonic()) > WAIT_MIN:
             if stop.wait(min(left, WAIT_MAX)):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Definitions of messages (`ros2msg`), and what their Python classes need."""
+"""Message definitions (`ros2msg`), and a fast import of type supports."""
 
 from .installed import (
     concatenated,

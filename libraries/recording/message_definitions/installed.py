@@ -19,9 +19,9 @@ _GENERATOR = 'rosidl_generator_py.generate_py_impl'
 def load_type_support() -> None:
     """Load the importer of type supports without the code generator.
 
-    The package goes without its generator where that cannot be imported. With it come templates
-    and a parser for interface files: 10 MB and a tenth of a second for each process, for
-    nothing. Who needs it later can still import it by its module.
+    The generator is optional for the package. It would load templates and a parser for interface
+    files: 10 MB and 0.1 s in each process, for nothing. It can still be imported later by its
+    module.
     """
     if _TYPE_SUPPORT in sys.modules:
         return
@@ -41,7 +41,7 @@ _NESTED = '=' * 80  # before each nested definition
 
 
 def nested_type(line: str, package: str) -> str | None:
-    """Return the message type of the field that a line declares, `package/msg/Name`.
+    """Return the message type, `package/msg/Name`, of the field that a line declares.
 
     None for constants, primitive types and comments.
     """
@@ -52,10 +52,10 @@ def nested_type(line: str, package: str) -> str | None:
 
 
 def concatenated(name: str, read: Callable[[str], str]) -> str:
-    """Return a definition with those of all nested messages, as in recordings (`ros2msg`).
+    """Return a definition followed by those of all nested messages, as in bags (`ros2msg`).
 
-    Each nested one appears once, below a line with its name, `package/msg/Name`; `read` returns
-    the text of a definition by its name.
+    Each nested definition appears once, below a line with its name, `package/msg/Name`; `read`
+    returns a definition by name.
     """
     found: dict[str, str] = {}
     wanted = [name]
@@ -72,14 +72,14 @@ def concatenated(name: str, read: Callable[[str], str]) -> str:
 
 
 class DefinitionError(LookupError):
-    """A type that is not installed, or defined in IDL only."""
+    """A message type is not installed, or is defined in IDL only."""
 
 
 def message_definition(name: str) -> str:
-    """Return the definition of `package/msg/Name` with those of all messages in it.
+    """Return the definition of `package/msg/Name` and those of all nested messages.
 
     Raises:
-        DefinitionError: It, or one in it, is not installed, or has no .msg file.
+        DefinitionError: The message or a nested one is not installed, or has no .msg file.
     """
     return concatenated(name, _read)
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as rosbag2 keeps them: a folder with metadata.yaml and MCAP files.
+"""Reads and writes rosbag2 recordings: a folder with metadata.yaml and MCAP files.
 
-Messages are bytes here (CDR), and times nanoseconds since 1970. ROS is not needed.
+Messages are bytes (CDR), times are nanoseconds since 1970. ROS is not needed.
 """
 
 from .metadata import (

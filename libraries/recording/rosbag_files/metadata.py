@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""metadata.yaml of a recording, as rosbag2 of Jazzy writes it (version 9)."""
+"""Reads and writes metadata.yaml in the format of rosbag2 in Jazzy (version 9)."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 
 @dataclass(frozen=True, slots=True)
 class OfferedQos:
-    """What a publisher offers. Durations are in [ns]; policies have the names of rmw.
+    """QoS that a publisher offers. Durations are in [ns]; policies have the names of rmw.
 
-    A subscription cannot find out history and depth of a publisher: they are `unknown` and 0 then.
+    A subscription cannot discover history and depth; they are `unknown` and 0 then.
     """
 
     history: str = 'unknown'
@@ -59,7 +59,7 @@ class OfferedQos:
     avoid_ros_namespace_conventions: bool = False
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in metadata.yaml, version 9."""
+        """Return the profile as in metadata.yaml, version 9."""
         values = asdict(self)
         for name in _DURATIONS:
             seconds, rest = divmod(values[name], _NANO)
@@ -70,10 +70,10 @@ class OfferedQos:
 def read_qos(values: object, where: str) -> OfferedQos:
     """Read a QoS profile of metadata.yaml, or of a file with overrides.
 
-    What is left out of the mapping has its default; `where` stands in messages.
+    Missing keys get their defaults; `where` names the source in error messages.
 
     Raises:
-        BagError: A key or a value that no QoS profile has.
+        BagError: A key or a value is unknown in QoS profiles.
     """
     if not isinstance(values, Mapping):
         raise BagError(f'{where}: a QoS profile is a mapping, not {values!r}')
@@ -133,13 +133,13 @@ class Topic:
     serialization: str = 'cdr'  # format of its messages
 
     def qos_dicts(self) -> list[dict[str, Any]]:
-        """The QoS profiles as metadata.yaml has them."""
+        """Return the QoS profiles in the format of metadata.yaml."""
         return [profile.to_dict() for profile in self.qos]
 
 
 @dataclass(frozen=True, slots=True)
 class TopicCount:
-    """A topic, and how many messages of it there are."""
+    """A topic and its number of messages."""
 
     topic: Topic
     count: int
@@ -157,7 +157,7 @@ class BagFile:
 
 @dataclass(frozen=True, slots=True)
 class BagMetadata:
-    """What a recording has."""
+    """Summary of a recording: its files, topics and message counts."""
 
     files: tuple[BagFile, ...]  # its files in order
     topics: tuple[TopicCount, ...]  # its topics with their counts
@@ -180,11 +180,11 @@ class BagMetadata:
 
     @property
     def count(self) -> int:
-        """How many messages there are."""
+        """Number of messages."""
         return sum(each.count for each in self.topics)
 
     def to_yaml(self) -> str:
-        """The text of metadata.yaml."""
+        """Return the text of metadata.yaml."""
         information = {
             'version': _VERSION,
             'storage_identifier': self.storage,
@@ -202,7 +202,7 @@ class BagMetadata:
         return yaml.safe_dump({_ROOT: information}, sort_keys=False, allow_unicode=True)
 
     def save(self, folder: Path) -> None:
-        """Write metadata.yaml of a folder, whole or not at all."""
+        """Write metadata.yaml to a folder atomically."""
         half = folder / f'.{METADATA_FILE}.part'
         half.write_text(self.to_yaml(), encoding='utf-8')
         half.replace(folder / METADATA_FILE)
@@ -232,7 +232,7 @@ def _file_dict(file: BagFile) -> dict[str, Any]:
 
 
 def load_metadata(path: Path) -> BagMetadata:
-    """Read a metadata.yaml; of any version up to 9."""
+    """Read a metadata.yaml of any version up to 9."""
     try:
         document = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -293,7 +293,7 @@ def _topic(each: Mapping[str, Any], path: Path) -> TopicCount:
 
 
 def parse_profiles(profiles: object, where: str) -> tuple[OfferedQos, ...]:
-    """Read a list of QoS profiles; before version 9 it was YAML in a text."""
+    """Read a list of QoS profiles; before version 9 it is a string of YAML."""
     if isinstance(profiles, str):
         try:
             profiles = yaml.safe_load(profiles)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a recording, also one that was not finished.
+"""Reads a recording, even an unfinished one.
 
-The reader of rosbags (0.11.9) is no substitute: it reads the files of a split one after the other,
-so that messages come out of order, keeps all of them open, and leaves a topic out, without a word,
-when metadata.yaml knows more QoS profiles of it than a file.
+The reader of rosbags (0.11.9) is no substitute: it reads the files of a split bag one after the
+other, so that messages are out of order, keeps all of them open, and silently skips a topic if
+metadata.yaml has more QoS profiles of it than a file.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _NUMBER = re.compile(r'(\d+)\.mcap(?:\.zstd)?\Z')
 
 @dataclass(frozen=True, slots=True)
 class BagMessage:
-    """A recorded message; times in [ns since 1970], sequence is the number of its publisher."""
+    """A recorded message; times in [ns since 1970], sequence as numbered by its publisher."""
 
     topic: str
     data: bytes
@@ -66,7 +66,7 @@ class BagReader:
         """Open a recording.
 
         Raises:
-            BagError: There is none, or it is not written as MCAP.
+            BagError: There is no recording, or its storage is not MCAP.
         """
         self.folder = path if path.is_dir() else path.parent
         # whether it has a metadata.yaml; without, its files were read through for it
@@ -89,7 +89,7 @@ class BagReader:
     ) -> Iterator[BagMessage]:
         """Yield the messages of some or all topics in the order in which they were received.
 
-        They begin with a time in [ns since 1970].
+        `start` is the time of the first one in [ns since 1970].
         """
         by_message = self.metadata.compression_mode == 'MESSAGE'
         unpack = zstandard.ZstdDecompressor().decompress if by_message else bytes
@@ -126,7 +126,7 @@ class BagReader:
                 )
 
     def _with_definitions(self, metadata: BagMetadata) -> BagMetadata:
-        """Add what the files say: definitions of messages, and their own times and counts."""
+        """Add what the files contain: message definitions, and their own times and counts."""
         if metadata.storage != STORAGE:
             raise BagError(f"{self.folder}: storage '{metadata.storage}'; only MCAP can be read")
         definitions: dict[str, str] = {}
@@ -147,7 +147,7 @@ class BagReader:
 
 
 def recording_files(folder: Path) -> list[Path]:
-    """The files of a recording in their order."""
+    """Return the files of a recording in order."""
     named = (path for path in folder.iterdir() if _NUMBER.search(path.name))
     # one that is being compressed is there twice, whole where it is not compressed
     by_number = {_number(path): path for path in sorted(named, key=lambda p: p.suffix != '.zstd')}
@@ -163,7 +163,7 @@ def _number(path: Path) -> str:
 
 
 def scan(folder: Path, paths: list[Path]) -> BagMetadata:
-    """Find out by reading files what metadata.yaml would say; how they are compressed, too."""
+    """Rebuild the content of metadata.yaml, with compression, by reading the files."""
     files: list[BagFile] = []
     topics: dict[str, Topic] = {}
     counts: Counter[str] = Counter()
@@ -193,7 +193,7 @@ def scan(folder: Path, paths: list[Path]) -> BagMetadata:
 
 
 def records(stream: IO[bytes]) -> Iterator[Topic | tuple[Channel, Message]]:
-    """Yield topics and messages as they stand in a file, up to where it is damaged."""
+    """Yield topics and messages in file order, up to the first damage."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     with contextlib.suppress(*_DAMAGE):
@@ -222,7 +222,7 @@ def _topic(channel: Channel, schema: Schema) -> Topic:
 def _in_order(
     stream: IO[bytes], topics: Collection[str] | None, start: int | None
 ) -> Iterator[tuple[Channel, Message]]:
-    """Yield messages by their time: by the index, or where there is none from memory."""
+    """Yield messages in order of time: by the index or, without one, sorted in memory."""
     if has_index(stream):
         found = make_reader(stream).iter_messages(topics, starting_at=start)
         yield from ((channel, message) for _, channel, message in found)
@@ -236,13 +236,13 @@ def _in_order(
 
 
 def has_index(stream: IO[bytes]) -> bool:
-    """Whether the messages of a file can be found by time without reading all of it."""
+    """Whether a file has an index, so that messages are found by time without reading it all."""
     summary = _summary(stream)
     return summary is not None and bool(summary.chunk_indexes) and bool(summary.channels)
 
 
 def _summary(stream: IO[bytes]) -> Summary | None:
-    """Return what the end of a file says of it; None where that is missing or damaged."""
+    """Return the summary at the end of a file; None if it is missing or damaged."""
     if stream.seek(0, os.SEEK_END) < FOOTER_SIZE + MAGIC_SIZE:
         return None  # the library would seek to before the begin
     stream.seek(0)  # where it expects the magic
@@ -253,7 +253,7 @@ def _summary(stream: IO[bytes]) -> Summary | None:
 
 
 def _with_statistics(file: BagFile, summary: Summary | None) -> BagFile:
-    """Replace times and count by those of the file: before version 5 metadata.yaml has none."""
+    """Set times and count from the file: metadata.yaml has none before version 5."""
     found = summary.statistics if summary is not None else None
     if found is None:
         return file
@@ -263,7 +263,7 @@ def _with_statistics(file: BagFile, summary: Summary | None) -> BagFile:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[IO[bytes]]:
-    """Open a file of a recording, decompressed where it is compressed as a whole."""
+    """Open a file of a recording; decompress one that is compressed as a whole."""
     try:
         source = path.open('rb')
     except OSError as error:

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes a recording: a folder with MCAP files and, at its end, metadata.yaml.
 
-What `BagWriter.flush` has written is readable whatever becomes of the process: a chunk of MCAP
-carries its schemas, channels and messages. Only the index at the end of the file and metadata.yaml
-are missing after a kill or a power failure; `BagReader` does without, and `repair` adds them.
+Data stays readable after `BagWriter.flush`, even if the process is killed: a chunk of MCAP holds
+its schemas, channels and messages. After a kill or a power failure, only the index at the end of
+the file and metadata.yaml are missing; `BagReader` does not need them, and `repair` adds them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LIBRARY = 'rosbag_files'
 
 
 class Preset(Enum):
-    """How MCAP files are written, after rosbag2's `--storage-preset-profile`."""
+    """Compression and index settings, as of rosbag2's `--storage-preset-profile`."""
 
     NONE = 'none'  # chunks with an index, not compressed
     FAST_WRITE = 'fastwrite'  # no chunks, no index
@@ -50,13 +50,13 @@ class WriterOptions:
 
 
 class BagWriter:
-    """Writes one recording; `close` it at the end. What cannot be written is a BagError."""
+    """Writes one recording; `close` it at the end. A failed write raises a BagError."""
 
     def __init__(self, folder: Path, options: WriterOptions | None = None) -> None:
-        """Make the folder and its first file.
+        """Create the folder and its first file.
 
         Raises:
-            BagError: The folder exists, or cannot be made.
+            BagError: The folder exists, or cannot be created.
         """
         self.folder = folder
         self._options = options or WriterOptions()
@@ -71,9 +71,9 @@ class BagWriter:
             self._file = self._open()
 
     def set_topic(self, topic: Topic) -> None:
-        """Announce a topic before its first message, or renew what is known of it.
+        """Register a topic before its first message, or update a registered one.
 
-        Of one that is known, QoS profiles are renewed: in metadata.yaml, and in the next file.
+        An update changes the QoS profiles in metadata.yaml and in the next file.
         """
         if topic.name not in self._topics:
             with _errors(self._file.path):
@@ -83,10 +83,10 @@ class BagWriter:
     def write(
         self, name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0
     ) -> None:
-        """Add a serialized message of a topic that was announced.
+        """Add a serialized message of a registered topic.
 
         It was received at `log_time` and published at `publish_time` in [ns since 1970]; MCAP
-        keeps 32 bits of the number that its publisher gave it.
+        keeps 32 bits of the publisher's sequence number.
         """
         with _errors(self._file.path):
             if self._is_full(log_time):
@@ -96,7 +96,7 @@ class BagWriter:
         self._counts[name] += 1
 
     def flush(self) -> None:
-        """Hand everything to the operating system, so that it outlives this process."""
+        """Write everything to the operating system, so that it survives a kill of this process."""
         with _errors(self._file.path):
             self._file.flush()
 
@@ -171,7 +171,7 @@ class McapFile:
 
     @property
     def count(self) -> int:
-        """How many messages there are."""
+        """Number of messages."""
         return self.counts.total()
 
     @property
@@ -180,11 +180,11 @@ class McapFile:
         return self._end - self.start
 
     def size(self) -> int:
-        """Size in [byte], with what is in no chunk yet."""
+        """Size in [byte], including the unfinished chunk."""
         return self._stream.tell() + self._pending  # codespell:ignore
 
     def add_topic(self, topic: Topic) -> None:
-        """Register a topic and, once, the type of its messages."""
+        """Register a topic, and its message type if it is new."""
         if topic.type not in self._schemas:
             encoding = 'ros2msg' if topic.definition else ''
             self._schemas[topic.type] = self._mcap.register_schema(
@@ -228,10 +228,9 @@ class McapFile:
 
 
 def repair(folder: Path) -> BagMetadata:
-    """Write metadata.yaml of a folder, and the index of files that have none.
+    """Write metadata.yaml of a folder, and the missing indices of its files.
 
-    A file without an index is written anew up to where it is damaged, and then takes the place of
-    the old one.
+    A file without an index is rewritten up to the first damage, and then replaces the old one.
 
     Raises:
         BagError: The folder holds no recording.

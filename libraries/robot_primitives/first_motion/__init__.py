@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first motion of a joint: guarded while it moves, then judged by what a person has seen.
+"""First motion of a joint: guarded while it moves, then judged by what a person observed.
 
-`guard` decides, `judgement` concludes and corrects: without a clock or bus.
+`guard` supervises the motion, `judgement` derives corrections; neither has a clock or bus.
 """
 
 from .guard import FOLLOWING, MotionGuard, MotionPlan, Order, Outcome, Sample

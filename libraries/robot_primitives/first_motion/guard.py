@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""When a joint may move, and what ends its motion: a state machine without clock and bus.
+"""Decides when a joint may move and what ends its motion: a state machine, no clock or bus.
 
 Positions are in the unit of the joint in bus.yml ([rad] or [m]), times on one steady clock in [s].
-The joint moves only while the person holds a key, which he has pressed after the motion was
-prepared. A loop that was held up for longer than :data:`LOOP_GAP` counts as a release: who was not
-asked has not agreed.
+The joint moves only while the person holds a key that was pressed after the motion was prepared. A
+loop that stalls for longer than :data:`LOOP_GAP` counts as a release: the key was not checked
+meanwhile.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ OTHER_WAY = (
 
 
 class Order(Enum):
-    """What is to be done with the drive now."""
+    """Command for the drive."""
 
     NONE = 'go on'
     GO = 'go to the target'
@@ -43,7 +43,7 @@ class Order(Enum):
 
 
 class Outcome(Enum):
-    """How a motion ended; the value is how a person reads it."""
+    """How a motion ended; the value is the text for the user."""
 
     RUNNING = 'it runs'
     REACHED = 'the drive reports that it is there'
@@ -59,7 +59,7 @@ class Outcome(Enum):
 
     @property
     def is_judged(self) -> bool:
-        """Whether what a person has seen says something; the others are errors."""
+        """Whether the person's observation is meaningful; other outcomes are errors."""
         return self in {Outcome.REACHED, Outcome.FINISHED, Outcome.STALLED}
 
 
@@ -77,7 +77,7 @@ class MotionPlan:
     others: Mapping[str, float] = field(default_factory=dict)  # where the other joints stand
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be guarded: nothing is beyond a limit that is not a number."""
+        """Reject a plan that cannot be guarded: a limit of NaN is never exceeded."""
         for name in ('start', 'distance', 'speed', 'increment'):
             if not math.isfinite(value := getattr(self, name)):
                 raise ValueError(f'{name} of the motion is {value}; no motion can be guarded')
@@ -88,18 +88,18 @@ class MotionPlan:
 
     @property
     def target(self) -> float:
-        """Where it ends."""
+        """End position of the motion."""
         return self.start + self.distance
 
     @property
     def noise(self) -> float:
-        """By how much a joint that stands may seem to move."""
+        """Largest apparent motion of a joint at rest."""
         return INCREMENTS * self.increment
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What the drives report."""
+    """Feedback of the drives."""
 
     position: float  # of the joint
     following_error: float = 0.0  # of the joint
@@ -109,10 +109,10 @@ class Sample:
 
 
 class MotionGuard:
-    """Decides, sample by sample, whether the joint may move on."""
+    """Decides, sample by sample, whether the joint may keep moving."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
-        """Begin at rest, and without a key."""
+        """Begin at rest, with no key held."""
         self.plan = plan  # the motion
         self.outcome = Outcome.RUNNING  # how it ended
         self.detail = ''  # the same with figures, for a person; empty while it runs
@@ -131,14 +131,14 @@ class MotionGuard:
         return self._moving
 
     def finish(self) -> Order:
-        """End it as the person wishes; what was seen is judged, if it has moved at all."""
+        """End the motion at the person's request; it is judged if the joint has moved."""
         return self._end(Outcome.FINISHED if self._has_begun else Outcome.IDLE)
 
     def step(self, now: float, sample: Sample, *, held: bool, busy: bool) -> Order:
-        """Judge a sample of the drives; return what is to be done.
+        """Check a sample of the drives; return the command for the drive.
 
-        Held: the person holds the key. Busy: the drive still carries out what was ordered last, so
-        it is not ordered to go.
+        ``held``: the person holds the key. ``busy``: the drive still executes the last command, so
+        it is not commanded to move.
         """
         if self.outcome is not Outcome.RUNNING:
             return Order.END
@@ -165,7 +165,7 @@ class MotionGuard:
         return Order.END
 
     def _ended(self, now: float, sample: Sample) -> tuple[Outcome, str] | None:
-        """Return what ends the motion now; what is dangerous first."""
+        """Return the reason that ends the motion now, the most dangerous first."""
         plan = self.plan
         if sample.problem:
             return Outcome.PROBLEM, sample.problem

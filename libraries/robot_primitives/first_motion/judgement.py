@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a first motion says about the scale of a joint, and which keys of bus.yml correct it.
+"""Derives errors in a joint's scale from a first motion, and the bus.yml keys to correct.
 
-``factor`` is everywhere what the person saw over what the drive reported, in the unit of bus.yml.
-A scale that has a factor too many increments per unit makes the joint go that many times too far.
+``factor`` is always observed over reported distance, in the unit of bus.yml. If a scale has too
+many increments per unit by a factor, the joint moves too far by that factor.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import math
 
 
 class JointKind(Enum):
-    """What a joint does; the value is the unit that a person reads."""
+    """Kind of a joint; the value is the unit shown to the user."""
 
     TURNS = 'deg'
     SLIDES = 'mm'
 
     @property
     def size(self) -> float:
-        """That unit in the one of bus.yml, in [rad] or [m]."""
+        """Size of the shown unit in that of bus.yml, in [rad] or [m]."""
         return math.pi / 180.0 if self is JointKind.TURNS else 0.001
 
     def shown(self, value: float) -> str:
-        """Return a value in [rad] or [m] as a person reads it."""
+        """Format a value in [rad] or [m] in the shown unit."""
         return f'{value / self.size:.4g} {self.value}'
 
 
@@ -38,7 +38,7 @@ INCREMENTS_MIN = 4  # of the drive that a motion has to have to be seen
 
 
 def too_far(kind: JointKind, distance: float) -> str:
-    """Return why a distance, in [rad] or [m], is not that of a first motion; empty when it is."""
+    """Return why a distance in [rad] or [m] is too long for a first motion, else empty."""
     if 0.0 < abs(distance) <= FURTHEST[kind]:
         return ''
     return (
@@ -48,7 +48,7 @@ def too_far(kind: JointKind, distance: float) -> str:
 
 
 def too_fast(kind: JointKind, speed: float) -> str:
-    """Return why a speed, in [rad/s] or [m/s], is not that of a first motion; empty when it is."""
+    """Return why a speed in [rad/s] or [m/s] is too high for a first motion, else empty."""
     if 0.0 < speed <= FASTEST[kind]:
         return ''
     return (
@@ -58,7 +58,7 @@ def too_fast(kind: JointKind, speed: float) -> str:
 
 
 def too_few_increments(kind: JointKind, distance: float, scale: float) -> str:
-    """Return why a distance in [rad] or [m] cannot be seen; empty when it can.
+    """Return why a distance in [rad] or [m] is too small to see, else empty.
 
     The scale is in increments per [rad] or [m].
     """
@@ -78,7 +78,7 @@ TURN = 2.0 * math.pi
 
 
 class Verdict(Enum):
-    """What is concluded; the value is how a person reads it."""
+    """Verdict on a motion; the value is the text for the user."""
 
     RIGHT = 'direction and distance are right'
     WRONG_SIGN = 'wrong sign: it moved the other way'
@@ -91,7 +91,7 @@ class Verdict(Enum):
 
     @property
     def wants_change(self) -> bool:
-        """Whether other scales in bus.yml correct it."""
+        """Whether a change of the scales in bus.yml corrects it."""
         return self in {
             Verdict.WRONG_SIGN,
             Verdict.WRONG_SCALE,
@@ -123,12 +123,12 @@ CAUSES: tuple[Cause, ...] = (
     Cause(1 / 1000, 'the scale is increments per mm, it has to be per m', _SLIDES),
     Cause(1000.0, 'the scale was multiplied by 1000; it is increments per m', _SLIDES),
 )
-"""Usual mistakes; those of a gear and of the drive's own factor group come with the drive."""
+"""Usual mistakes; those of gear and factor group are derived from the drive."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveFacts:
-    """What the drive says about its increments; None where it does not."""
+    """What the drive reports about its increments; None if it does not."""
 
     scale: float  # increments per unit that the master uses; negative for the other direction
     gear: float | None = None  # turns of the motor per turn of the shaft (0x6091)
@@ -138,7 +138,7 @@ class DriveFacts:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a person saw."""
+    """What a person observed."""
 
     direction: int  # 1, -1, or 0 for no motion
     distance: float | None = None  # how far about, in [rad] or [m]; None for what was expected
@@ -147,7 +147,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is concluded."""
+    """Result of :func:`judge`."""
 
     verdict: Verdict  # the conclusion
     sign: int = 1  # -1 where the scale has the wrong sign, else 1
@@ -160,7 +160,7 @@ class Judgement:
 def judge(
     kind: JointKind, commanded: float, reported: float, seen: Seen, facts: DriveFacts
 ) -> Judgement:
-    """Conclude from a motion, commanded and reported in [rad] or [m]."""
+    """Judge a motion by its commanded, reported ([rad] or [m]) and observed distances."""
     if seen.other_joint:
         return Judgement(
             Verdict.OTHER_JOINT,
@@ -202,7 +202,7 @@ def _still(*, moved: bool) -> Judgement:
 
 
 def _causes(kind: JointKind, measured: float, facts: DriveFacts) -> tuple[bool, tuple[Cause, ...]]:
-    """Return whether the scale is wrong, and what explains it."""
+    """Return whether the scale is wrong, and possible causes."""
     if measured <= 0.0:
         return False, ()
     own = list(_causes_of_drive(kind, facts))
@@ -219,7 +219,7 @@ def _causes(kind: JointKind, measured: float, facts: DriveFacts) -> tuple[bool, 
 
 
 def _causes_of_drive(kind: JointKind, facts: DriveFacts) -> Iterable[Cause]:
-    """Yield factors that follow from what the drive says, but for those near 1."""
+    """Yield causes that follow from the drive's facts, except factors near 1."""
     if kind is JointKind.TURNS and facts.factor_scale:
         yield from _unless_one(
             abs(facts.scale) / facts.factor_scale,
@@ -238,7 +238,7 @@ def _unless_one(factor: float, text: str) -> Iterable[Cause]:
 
 
 def _distinct(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """Keep the first of causes that lead to one factor."""
+    """Keep only the first of the causes with the same factor."""
     kept: list[Cause] = []
     for cause in causes:
         if all(_apart(cause.factor, other.factor) > math.log(1.01) for other in kept):
@@ -255,7 +255,7 @@ SAME = 1e-6  # share by which two scales may differ and still be the same
 
 @dataclass(frozen=True, slots=True)
 class AxisScales:
-    """How an axis counts: keys of bus.yml by their names, with the values that the master uses."""
+    """Scales of an axis: keys of bus.yml, with the values that the master uses."""
 
     scale_from_factor_group: bool  # the drive says how it counts (0x608F, 0x6091, 0x6092, 0x6096)
     scale_pos_to_dev: float  # increments per [rad] or [m]
@@ -268,15 +268,15 @@ class AxisScales:
 
     @classmethod
     def of(cls, source: object) -> AxisScales:
-        """Copy them from an object with attributes of these names."""
+        """Copy the scales from an object with attributes of these names."""
         return cls(**{each.name: getattr(source, each.name) for each in fields(cls)})
 
 
 def corrected(axis: AxisScales, sign: int, factor: float) -> dict[str, float | bool]:
     """Return the keys to change with their new values, in the order of the file.
 
-    The sign is -1 to turn the direction, and the factor the way of the joint over what the drive
-    reported, without the sign.
+    A ``sign`` of -1 reverses the direction; ``factor`` is observed over reported distance,
+    unsigned.
     """
     change = sign / factor
     to_dev = axis.scale_pos_to_dev * change
@@ -306,7 +306,7 @@ def corrected(axis: AxisScales, sign: int, factor: float) -> dict[str, float | b
 
 
 def _rounded(value: float | bool) -> float | bool:
-    """Drop what double precision has added, as 1.0000000000000002."""
+    """Remove rounding errors of double precision, such as 1.0000000000000002."""
     return value if isinstance(value, bool) else float(f'{value:.12g}')
 
 
@@ -326,7 +326,7 @@ class Correction:
 
 
 def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Correction:
-    """Return the correction of a sign or scale; cause None takes it by what was seen by eye."""
+    """Return the correction of a sign or scale; cause None uses the observed factor."""
     turned = 'the sign was wrong'
     if judgement.verdict is Verdict.WRONG_SIGN:
         factor, why = 1.0, turned
@@ -348,7 +348,7 @@ def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Co
 
 
 def yaml_text(value: float | bool) -> str:
-    """Write a value as YAML 1.1 reads it; 2e-05 were a text there, 2.0e-05 is a number."""
+    """Format a value for YAML 1.1, which reads 2e-05 as text, but 2.0e-05 as a number."""
     if isinstance(value, bool):
         return str(value).lower()
     mantissa, exponent, power = repr(value).partition('e')

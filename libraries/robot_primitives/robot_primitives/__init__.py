@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What arms and quadrupeds share, each once: pure, without ROS, threads or clocks of its own."""
+"""Functions shared by arms and quadrupeds: pure, without ROS, threads or clocks."""
 
 from __future__ import annotations
 

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Hot paths in C, built by the C compiler of the machine at their first use.
+"""Hot paths in C, built at first use by the C compiler of the machine.
 
 A library is kept in ``$XDG_CACHE_HOME/<package>/compiled`` (``~/.cache/<package>/compiled``), one
-file for each source, compiler and its version, flags and processor. Each has a reference in
-Python, which takes its place where there is no compiler, or it fails, or
-``<PACKAGE>_COMPILED=0`` asks for that.
+file per source, compiler version, flags and processor. Each has a reference in Python, which is
+used if there is no compiler, the build fails, or ``<PACKAGE>_COMPILED=0`` is set.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ BUILD_TIME = 60.0  # time that the compiler is given in [s]
 
 
 def cache_folder(package: str) -> Path | None:
-    """Return the cache of a package; None for a user without a home."""
+    """Return the cache folder of a package; None for a user without a home folder."""
     cache = os.environ.get('XDG_CACHE_HOME')
     try:
         return (Path(cache) if cache else Path.home() / '.cache') / package
@@ -36,10 +35,10 @@ def cache_folder(package: str) -> Path | None:
 def load_c_library(
     package: str, source: Path, consequence: str, flags: Sequence[str] = ()
 ) -> ctypes.CDLL | None:
-    """Return the library of a C file; None, with one warning, where it cannot be built or loaded.
+    """Return the library of a C file; None, with a warning, if it cannot be built or loaded.
 
-    Not thread-safe, and not cached in the process. The warning says what follows, and the package
-    has the cache and the variable that switches it off.
+    Not thread-safe, and not cached in the process. The warning states the ``consequence``;
+    ``package`` names the cache and the environment variable that disables the library.
     """
     if os.environ.get(f'{package.upper()}_COMPILED') == '0':
         return None
@@ -55,10 +54,10 @@ def load_c_library(
 
 
 def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
-    """Load the shared library, which is built where it is not in the cache, or damaged there.
+    """Load the shared library; build it if it is missing or damaged in the cache.
 
     Raises:
-        OSError, ValueError, SubprocessError: It cannot be built, or not be loaded.
+        OSError, ValueError, SubprocessError: It cannot be built or loaded.
     """
     import ctypes
     import hashlib
@@ -89,7 +88,7 @@ def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
 
 
 def _build(command: Sequence[str], source: Path, kept: Path | None = None) -> ctypes.CDLL:
-    """Build the library and load it; keep it as a file, written whole or not at all."""
+    """Build and load the library; with ``kept``, store it there atomically."""
     import ctypes
     import subprocess
     import tempfile
@@ -108,7 +107,7 @@ def _build(command: Sequence[str], source: Path, kept: Path | None = None) -> ct
 
 
 def _processor() -> str:
-    """Return the kind of this processor: a home may serve several, whose programs differ."""
+    """Return the type of this processor: machines that share a home folder may differ."""
     try:
         lines = Path('/proc/cpuinfo').read_text(encoding='ascii', errors='replace').splitlines()
     except OSError:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The latest that is known of each joint, and when it was measured."""
+"""Stores the latest measurement of each joint and its time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class JointSample(NamedTuple):
-    """What was measured of a joint: radians, or metres of a joint that slides."""
+    """Measurement of a joint, in radians, or metres for a prismatic joint."""
 
     position: float
     velocity: float  # NaN where it is not measured
@@ -18,13 +18,13 @@ class JointSample(NamedTuple):
 
 
 class JointStateStore:
-    """The latest sample of each joint, from messages that name some of them in any order.
+    """The latest sample of each joint, from messages that hold any subset in any order.
 
     One thread writes, any thread reads: a sample is replaced as a whole.
     """
 
     def __init__(self, joints: Collection[str] | None = None) -> None:
-        """Begin empty; with names, other joints are ignored."""
+        """Begin empty; if ``joints`` are given, all others are ignored."""
         self._joints = None if joints is None else frozenset(joints)
         self._samples: dict[str, JointSample] = {}
 

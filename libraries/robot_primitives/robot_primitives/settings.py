@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Typed settings: fields of a dataclass with default, range and meaning, declared once.
 
-``ParameterReader.settings`` of node_runner makes parameters of them.
+``ParameterReader.settings`` of node_runner declares them as ROS parameters.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 
 class Setting(NamedTuple):
-    """What can be set of a dataclass."""
+    """A field of a dataclass that can be set."""
 
     name: str
     default: Any  # a number, a bool, a text, or a member of an Enum
@@ -23,12 +23,12 @@ class Setting(NamedTuple):
 
 
 def setting(default: float, least: float, most: float, meaning: str) -> Any:  # noqa: ANN401
-    """Return a field for a number; a whole one where the default is an int."""
+    """Return a field for a number; an integer if the default is an int."""
     return field(default=default, metadata={'setting': (default, (least, most), meaning)})
 
 
 def switch(default: bool | Enum | str, meaning: str) -> Any:  # noqa: ANN401
-    """Return a field that is on or off, one of several, or a text."""
+    """Return a field for a bool, an enum or a text."""
     return field(default=default, metadata={'setting': (default, None, meaning)})
 
 
@@ -40,7 +40,7 @@ def settings_of(kind: Any) -> Iterator[Setting]:  # noqa: ANN401  # a dataclass 
 
 
 def settings_problem(values: Any) -> str:  # noqa: ANN401
-    """Return name and range of a number outside of its range; empty where there is none."""
+    """Name a number that is out of range, with the range; empty if there is none."""
     for name, _, span, _ in settings_of(values):
         value = getattr(values, name)
         if span is not None and not span[0] <= value <= span[1]:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which commands may still move a robot: none that is older than a stop, no stream that it ended.
+"""Rejects commands that are older than a stop, and streams that a stop has ended.
 
-A *channel* is a way by which a robot is commanded, such as jogging. A *stream* is what one client
-sends on a channel, command after command. All times are on one steady clock in [s].
+A *channel* is one kind of command source, such as jogging. A *stream* is the sequence of commands
+that one client sends on a channel. All times are on one steady clock in [s].
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Channel = TypeVar('Channel', bound=Hashable)
 
 @dataclass(frozen=True, slots=True)
 class StreamRules:
-    """When commands of one client are one stream, and when that is over."""
+    """Which commands of one client belong to one stream, and when it ends."""
 
     remedy: str  # how a stream that was ended is begun again
     # longest time between two commands of a stream in [s]; infinite: each single one is a stream
@@ -36,7 +36,7 @@ class StreamRules:
 
 @dataclass(slots=True)
 class _Stream:
-    """What one client sends."""
+    """The commands of one client on one channel."""
 
     last: float = -math.inf  # when its last command came in [s]
     until: float = -math.inf  # until when that counts in [s]
@@ -46,18 +46,18 @@ class _Stream:
 
 
 class StreamGate(Generic[Channel]):
-    """Numbers commands and stops, and refuses what a stop or a newer command has made void.
+    """Numbers commands and stops, and rejects commands that a stop or a newer command cancels.
 
-    A command takes its number when it is requested, and is checked with it whenever it goes on:
-    what was requested before a stop never passes afterwards. Whatever ends the following of the
-    robot ends the streams under way, too: from then on a pause of their commands is no new
-    request. All methods are for any thread.
+    A command gets its number when it is requested, and is checked by it at each later stage: a
+    command from before a stop never passes afterwards. Anything that makes the robot stop
+    following also ends the active streams: a pause in their commands no longer counts as a new
+    request. Thread-safe.
     """
 
     def __init__(
         self, channels: Collection[Channel], rules: Mapping[Channel, StreamRules]
     ) -> None:
-        """Begin open; rules are those of the channels on which clients send streams."""
+        """Begin open; ``rules`` apply to the channels on which clients send streams."""
         self._lock = threading.Lock()  # held for a few instructions only
         self._numbers = count(1)
         self._floors: dict[Channel, tuple[int, str]] = dict.fromkeys(channels, (0, ''))
@@ -65,12 +65,12 @@ class StreamGate(Generic[Channel]):
         self._streams: dict[tuple[Channel, Hashable], _Stream] = {}
 
     def number(self) -> int:
-        """Return the number of a command that is requested now."""
+        """Return the number for a command that is requested now."""
         with self._lock:
             return next(self._numbers)
 
     def stop(self, channels: Collection[Channel], reason: str, number: int | None = None) -> None:
-        """Refuse what was requested on some channels so far, or before a newer number."""
+        """Reject all commands so far on some channels, or those before a given number."""
         with self._lock:
             number = next(self._numbers) if number is None else number
             for channel in channels:
@@ -78,7 +78,7 @@ class StreamGate(Generic[Channel]):
                     self._floors[channel] = number, reason
 
     def refusal(self, channel: Channel, number: int) -> str:
-        """Return why a command does not go on; empty while it may."""
+        """Return why a command is rejected; empty while it may proceed."""
         floor, reason = self._floors[channel]
         return f'stopped before it had begun: {reason}' if number < floor else ''
 
@@ -88,7 +88,7 @@ class StreamGate(Generic[Channel]):
         """Record a command of motion of a client, which moves the robot until it expires.
 
         Returns:
-            Why it is refused, as its stream was ended; empty when it is not.
+            Why it is rejected, because its stream was ended; empty if it is accepted.
         """
         rules = self._rules[channel]
         with self._lock:
@@ -102,25 +102,25 @@ class StreamGate(Generic[Channel]):
             return f'{stream.barred}; {rules.remedy}' if stream.barred else ''
 
     def release(self, channel: Channel, client: Hashable) -> None:
-        """Record that a client lets go: what it sends next is a new request."""
+        """Record that a client released: its next command is a new request."""
         with self._lock:
             self._streams.pop((channel, client), None)
 
     def ask(self, channel: Channel, client: Hashable, now: float) -> None:
-        """Record that a command asks for the robot; minus infinity takes that back."""
+        """Record that a command requests the robot; minus infinity withdraws the request."""
         with self._lock:
             if (channel, client) in self._streams:
                 self._streams[channel, client].asked = now
 
     def interrupt(self, reason: str, now: float) -> None:
-        """Stop all channels; streams under way have to be let go before they go on."""
+        """Stop all channels; active streams must be released before they continue."""
         self.stop(self._floors.keys(), reason)
         with self._lock:
             for (channel, _), stream in self._streams.items():
                 self._bar(stream, self._rules[channel], reason, now)
 
     def begin(self, reason: str, now: float) -> None:
-        """Stop the streams that have not just asked for a robot which begins to follow."""
+        """Stop the streams that did not request the robot recently, when it begins to follow."""
         barred: set[Channel] = set()
         with self._lock:
             for (channel, _), stream in self._streams.items():
@@ -133,7 +133,7 @@ class StreamGate(Generic[Channel]):
         self.stop(barred, reason)
 
     def renew(self, channel: Channel, now: float, silence: float = -math.inf) -> None:
-        """Treat what comes next on a channel as new, on behalf of a person.
+        """Treat the next commands on a channel as new requests, on behalf of a person.
 
         Streams whose last command is no older than ``silence`` in [s] stay as they are.
         """
@@ -145,7 +145,7 @@ class StreamGate(Generic[Channel]):
             }
 
     def _bar(self, stream: _Stream, rules: StreamRules, reason: str, now: float) -> bool:
-        """Require that a stream is let go, if it is under way; return whether it is."""
+        """Require the release of a stream if it is active; return whether it is."""
         is_under_way = stream.is_stream and now - stream.until <= rules.let_go
         if is_under_way:
             stream.barred = stream.barred or reason

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robot descriptions as plain values: the kinematic tree of a URDF, the groups of an SRDF.
+"""Reads robot descriptions: the kinematic tree of a URDF, the groups of an SRDF.
 
-The standard library is enough for it, but for xacro files, so that every package can read a
-description here: the model of an arm, publishers of joint states and of /tf, bring-ups.
+It needs only the standard library, except for xacro files, so every package can use it: arm
+models, publishers of joint states and /tf, bring-ups.
 """
 
 from .exceptions import DescriptionError, MeshFileError, XacroError

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What urdf_reader raises."""
+"""Exceptions of urdf_reader."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class DescriptionError(ValueError):
 
 
 class MeshFileError(DescriptionError):
-    """The file of a mesh cannot be found; the message says what to do."""
+    """The file of a mesh cannot be found; the message names the remedy."""
 
 
 class XacroError(DescriptionError):

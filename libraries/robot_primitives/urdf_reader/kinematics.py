@@ -24,10 +24,10 @@ def joint_transform(joint: Joint, position: float) -> Transform:
 def joint_position(
     joint: Joint, positions: Mapping[str, float], missing: float | None = None
 ) -> float | None:
-    """Return the position of a joint in [rad] or [m]; None where nothing says it.
+    """Return the position of a joint in [rad] or [m]; None if it is unknown.
 
-    One that follows another is where it was measured, else where its source puts it, as
-    robot_state_publisher has it. Joints without a position stand where ``missing`` says.
+    A mimic joint takes its measured position, else the one computed from its source, as in
+    robot_state_publisher. Joints without a position are at ``missing``.
     """
     if joint.name in positions or joint.mimic is None:
         return positions.get(joint.name, missing)
@@ -38,9 +38,9 @@ def joint_position(
 def link_poses(
     tree: KinematicTree, positions: Mapping[str, float], base: str = ''
 ) -> dict[str, Transform]:
-    """Return the poses of all links below a base link, by default the root, in it.
+    """Return the poses of all links below a base link (default: root) in its frame.
 
-    Joints that are missing in the positions, in [rad] or [m], stand at zero.
+    ``positions`` are in [rad] or [m]; missing joints are at zero.
     """
     poses = {base or tree.root: Transform()}
     for joint in parents_first(tree):
@@ -51,9 +51,9 @@ def link_poses(
 
 
 def centre_of_mass(masses: Iterable[PointMass], poses: Mapping[str, Transform]) -> Vector | None:
-    """Return the centre of masses at poses of their links in [m]; None without masses.
+    """Return the centre of mass in [m] for given link poses; None without masses.
 
-    Those of links that have no pose are left out.
+    Masses of links without a pose are ignored.
     """
     total, x, y, z = 0.0, 0.0, 0.0, 0.0
     for part in masses:
@@ -65,7 +65,7 @@ def centre_of_mass(masses: Iterable[PointMass], poses: Mapping[str, Transform]) 
 
 
 def parents_first(tree: KinematicTree) -> Iterator[Joint]:
-    """Yield each joint behind the one that its parent hangs on, in whatever order they stand."""
+    """Yield the joints so that each follows the joint of its parent link."""
     known, waiting = {tree.root}, list(tree.joints)
     while waiting:
         later: list[Joint] = []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Semantic description (SRDF): groups, named poses, end effectors, pairs that are not checked."""
+"""Semantic description (SRDF): groups, named poses, end effectors, disabled collisions."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class SemanticDescription:
         )
 
     def group(self, name: str) -> Group:
-        """Return a group; an unknown name is a DescriptionError."""
+        """Return a group; an unknown name raises a DescriptionError."""
         if name not in self.groups:
             known = ', '.join(self.groups) or 'none'
             raise DescriptionError(f'there is no group {name!r} in the SRDF; groups: {known}')
@@ -82,7 +82,7 @@ class SemanticDescription:
 
 
 def parse_srdf(text: str) -> SemanticDescription:
-    """Read an SRDF; what is none is a DescriptionError."""
+    """Read an SRDF; any other text raises a DescriptionError."""
     try:
         root = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
     except ET.ParseError as error:
@@ -130,7 +130,7 @@ def _group(element: ET.Element) -> Group:
 
 
 def _pose(state: ET.Element) -> Mapping[str, float]:
-    """Return the positions of a pose, without joints of several directions: no group has these."""
+    """Return the positions of a pose, without multi-DOF joints, which no group has."""
     try:
         values = {
             joint.get('name', ''): [*map(float, joint.get('value', '').split() or [''])]
@@ -159,16 +159,16 @@ def find_group(
 ) -> JointGroup:
     """Find a group of an SRDF in the description.
 
-    Chains, joints, links (each with the joint that moves it) and subgroups make it; fixed, mimic
-    and passive joints in it do not move by themselves.
+    It consists of chains, joints, links (each with the joint that moves it) and subgroups; its
+    fixed, mimic and passive joints are not independent.
 
     Args:
         name: The group; by default the only one, or the only one that is no tool.
         tip: The tip link; by default the end of the last chain, or the link of the last joint.
 
     Raises:
-        DescriptionError: There is no such group, it names what does not exist, it has no joint
-            that moves, or one that moves in several directions.
+        DescriptionError: The group is unknown, refers to something unknown, or has no movable
+            joint, or a multi-DOF joint.
     """
     group = semantic.group(_only(semantic) if name is None else name)
     members = [*_with_subgroups(group, semantic, ())]
@@ -197,7 +197,7 @@ def _only(semantic: SemanticDescription) -> str:
 def _with_subgroups(
     group: Group, semantic: SemanticDescription, above: tuple[str, ...]
 ) -> Iterator[Group]:
-    """Go through a group and the groups in it, the inner ones last."""
+    """Yield a group, then the groups in it."""
     if group.name in above:
         raise DescriptionError(f'group {group.name} contains itself')
     yield group
@@ -206,7 +206,7 @@ def _with_subgroups(
 
 
 def _joints(tree: KinematicTree, semantic: SemanticDescription, group: Group) -> Iterator[Joint]:
-    """Go through the joints that a group names itself, without its subgroups."""
+    """Yield the joints that a group names itself, without its subgroups."""
     for base, tip in group.chains:
         yield from tree.chain(base, tip)
     by_name = {joint.name: joint for joint in tree.joints}
@@ -244,7 +244,7 @@ def _check_range(joint: Joint) -> None:
 
 
 def _place(tree: KinematicTree, joint: str) -> tuple[int, int]:
-    """Return how many joints a joint hangs on, and its place in the description."""
+    """Return the depth of a joint in the tree, and its index in the description."""
     number, found = next(
         (number, each) for number, each in enumerate(tree.joints) if each.name == joint
     )

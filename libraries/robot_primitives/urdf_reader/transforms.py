@@ -47,7 +47,7 @@ def about(axis: Vector, angle: float) -> Quaternion:
 
 
 def multiply(second: Quaternion, first: Quaternion) -> Quaternion:
-    """Return the rotation that does ``first``, then ``second``."""
+    """Return the rotation that applies ``first``, then ``second``."""
     ax, ay, az, aw = second
     bx, by, bz, bw = first
     return (
@@ -71,7 +71,7 @@ def rotate(rotation: Quaternion, vector: Vector) -> Vector:
 
 
 def compose(parent: Transform, child: Transform) -> Transform:
-    """Return the pose of what is in a frame that is in another one."""
+    """Return the transform a to c from a to b (``parent``) and b to c (``child``)."""
     x, y, z = rotate(parent.rotation, child.translation)
     a, b, c = parent.translation
     return Transform((a + x, b + y, c + z), multiply(parent.rotation, child.rotation))

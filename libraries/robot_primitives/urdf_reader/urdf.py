@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic tree of a URDF: links and their shapes, joints, and which joints follow others.
+"""The kinematic tree of a URDF: links and their shapes, joints, and mimic joints.
 
 Format: http://wiki.ros.org/urdf/XML. Links, joints and their origins are checked at once, limits,
-shapes and masses when they are read: a viewer does without. What is not usable is a
+shapes and masses on access, as a viewer does not need them. Invalid content raises a
 DescriptionError.
 """
 
@@ -42,24 +42,24 @@ MOVABLE = frozenset({JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMAT
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint follows another: position = multiplier * position of the source + offset."""
+    """Mimic rule of a joint: position = multiplier * position of the source + offset."""
 
     source: str  # name of the joint that is followed; never one that follows another
     multiplier: float = 1.0  # factor; [m/rad] or [rad/m] between a rotary and a linear joint
     offset: float = 0.0  # summand in [rad] or [m]
 
     def position(self, source: float) -> float:
-        """Return the position in [rad] or [m] that belongs to one of the source."""
+        """Return the position in [rad] or [m] for a position of the source."""
         return self.multiplier * source + self.offset
 
     def velocity(self, source: float) -> float:
-        """Return the velocity in [rad/s] or [m/s] that belongs to one of the source."""
+        """Return the velocity in [rad/s] or [m/s] for a velocity of the source."""
         return self.multiplier * source
 
 
 @dataclass(frozen=True, slots=True)
 class JointRange:
-    """How far and how fast a joint moves; radians or metres."""
+    """Position range and maximum velocity of a joint, in radians or metres."""
 
     name: str  # name of the joint
     lower: float  # least position in [rad]; minus infinity for a continuous joint
@@ -91,13 +91,13 @@ class Joint:
 
     @property
     def range(self) -> JointRange:
-        """How far and how fast it moves; velocity 0 where the description gives none.
+        """Position range and maximum velocity; velocity 0 if the description has none.
 
         Soft limits narrow it, as in MoveIt.
 
         Raises:
-            DescriptionError: It has no ``<limit>`` although it is neither continuous nor fixed,
-                or that has no usable numbers.
+            DescriptionError: It is neither continuous nor fixed and has no ``<limit>``, or one
+                without usable numbers.
         """
         if self.limit is None and self.kind is JointKind.CONTINUOUS:
             return JointRange(self.name, -math.inf, math.inf, 0.0)
@@ -119,7 +119,7 @@ class Joint:
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Least and greatest position in [rad] of ``<limit>``."""
+        """Lower and upper position of ``<limit>`` in [rad]."""
         if self.limit is None or self.kind is JointKind.CONTINUOUS:
             return -math.inf, math.inf
         return float(self.limit.get('lower', 0)), float(self.limit.get('upper', 0))
@@ -130,7 +130,7 @@ Color: TypeAlias = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class UrdfShape:
-    """A shape of a link: what it looks like, or what may not touch anything."""
+    """A visual or collision shape of a link."""
 
     link: str  # name of the link
     shape: str  # what it is: box, cylinder, sphere, mesh, or empty where there is none
@@ -170,18 +170,18 @@ class KinematicTree:
     _robot: ET.Element = field(repr=False, compare=False)
 
     def movable(self) -> Iterator[Joint]:
-        """Go through the joints that have a position in a JointState."""
+        """Yield the joints that have a position in a JointState."""
         return (joint for joint in self.joints if joint.kind in MOVABLE)
 
     def ranges(self) -> dict[str, JointRange]:
-        """Return how far and how fast the joints with a freedom of their own move, by name."""
+        """Return position range and maximum velocity of each independent joint, by name."""
         return {joint.name: joint.range for joint in self.joints if joint.independent}
 
     def chain(self, base: str, tip: str) -> list[Joint]:
         """Return the joints from a link out to the tip.
 
         Raises:
-            DescriptionError: A link is unknown, or the tip does not hang on the base.
+            DescriptionError: A link is unknown, or the tip is no descendant of the base.
         """
         for link in (base, tip):
             if link not in self.links:
@@ -202,15 +202,15 @@ class KinematicTree:
         return joints[::-1]
 
     def collisions(self) -> Iterator[UrdfShape]:
-        """Go through the collision shapes of all links."""
+        """Yield the collision shapes of all links."""
         return self._shapes('collision')
 
     def visuals(self) -> Iterator[UrdfShape]:
-        """Go through what the links look like."""
+        """Yield the visual shapes of all links."""
         return self._shapes('visual')
 
     def masses(self) -> Iterator[PointMass]:
-        """Go through the masses of the links that have one."""
+        """Yield the masses of the links that have one."""
         for link in self._robot.findall('link'):
             inertial = link.find('inertial')
             mass = None if inertial is None else inertial.find('mass')
@@ -238,9 +238,9 @@ class KinematicTree:
                 )
 
     def bare_urdf(self, bound: float) -> str:
-        """Return a URDF of links and joints only, for readers of kinematics.
+        """Return a URDF with links and joints only, for kinematics libraries.
 
-        Continuous joints become revolute ones that end at the bound to either side in [rad].
+        Continuous joints become revolute ones with limits of -bound and +bound in [rad].
         """
         bare = ET.Element('robot', name=self.name or 'robot')
         for link in self.links:
@@ -260,7 +260,7 @@ def read_urdf(text: str) -> KinematicTree:
     """Read a URDF.
 
     Raises:
-        DescriptionError: The text is empty or no URDF, or its joints make no tree; the message
+        DescriptionError: The text is empty or no URDF, or its joints form no tree; the message
             names the element.
     """
     robot = _parse(text)
@@ -320,7 +320,7 @@ def _joint(element: ET.Element) -> Joint:
 
 
 def _soft(element: ET.Element, joint: str) -> tuple[float, float] | None:
-    """Return the soft limits of a joint, if it has both: some controllers have gains alone."""
+    """Return the soft limits of a joint, if it has both: some descriptions have gains only."""
     safety = element.find('safety_controller')
     if safety is None or not {'soft_lower_limit', 'soft_upper_limit'} <= set(safety.attrib):
         return None
@@ -352,9 +352,9 @@ def _origin(element: ET.Element, what: str) -> Transform:
 def _color(
     material: ET.Element | None, materials: Mapping[str | None, ET.Element]
 ) -> tuple[Color | None, str]:
-    """Return the color of a material, or of the robot's one of that name, and what is wrong.
+    """Return the color of a material, or of the global one of that name, and any problem.
 
-    A wrong color is no reason to refuse a robot: the shape has none then.
+    An invalid color does not reject the robot: the shape has no color.
     """
     if material is None:
         return None, ''
@@ -418,7 +418,7 @@ def _refuse_duplicates(what: str, names: Sequence[str]) -> None:
 
 
 def _root(links: Sequence[str], joints: Sequence[Joint]) -> str:
-    """Find the link without a parent, and make sure that all others hang on it."""
+    """Find the root link, and check that all other links descend from it."""
     if not links:
         raise DescriptionError('the robot description has no <link>')
     parents: dict[str, Joint] = {}
@@ -452,7 +452,7 @@ def _refuse_loops(links: Sequence[str], parents: Mapping[str, Joint]) -> None:
 
 
 def _with_first_source(joint: Joint, joints: Mapping[str, Joint]) -> Joint:
-    """Follow a chain of mimics to the joint at its beginning."""
+    """Resolve a chain of mimic joints to its independent joint."""
     mimic = joint.mimic
     passed = {joint.name}
     while mimic is not None:

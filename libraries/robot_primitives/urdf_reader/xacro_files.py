@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Expands xacro files of others as they are.
+"""Expands third-party xacro files without changes to them.
 
-What they include for ros2_control or Gazebo is left out where it is not installed: it is for other
-drivers and simulators.
+Includes for ros2_control or Gazebo that are not installed are skipped: they serve other drivers
+and simulators.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def expand_xacro(
 
 
 def _missing(path: Path, words: str) -> XacroError | None:
-    """Return what is missing and the remedy, where xacro's words are long or have none."""
+    """Return what is missing and the remedy, if xacro's message is long or has no remedy."""
     if found := NOT_FOUND.search(words):
         name = found['package']
         reason = f'package {name!r} is not found: source the workspace that has it'
@@ -76,10 +76,10 @@ def _missing(path: Path, words: str) -> XacroError | None:
 
 @contextlib.contextmanager
 def _package_overlay(packages: Mapping[str, Path]) -> Iterator[Path]:
-    """Make ``$(find ...)`` find folders as if they were installed, while the block runs.
+    """Make ``$(find ...)`` resolve to the given folders while the block runs.
 
     Yields:
-        The folder in which it finds them.
+        The temporary share folder that links to them.
     """
     with tempfile.TemporaryDirectory(prefix='packages-') as prefix:
         share = Path(prefix, 'share')
@@ -134,18 +134,19 @@ def _of_other_hardware(name: str) -> bool:
 
 
 COLLADA_UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*["\']([^"\']+)["\']')
-"""Where a COLLADA file says how many metres its unit has."""
+"""Matches the unit of a COLLADA file in metres."""
 
 
 def find_mesh(name: str, folder: Path | None = None) -> Path:
     """Find the file of a mesh.
 
     Args:
-        name: How the URDF names it: ``package://``, ``file://``, an absolute or a relative path.
-        folder: Folder of the description: relative paths begin here, and a package may lie in it.
+        name: Name in the URDF: ``package://``, ``file://``, an absolute or a relative path.
+        folder: Folder of the description: the base of relative paths; it may contain packages.
 
     Raises:
-        MeshFileError: There is no such package or file, or a relative name without a folder.
+        MeshFileError: There is no such package or file, or the name is relative and no folder is
+            given.
     """
     scheme, separator, rest = name.partition('://')
     if separator and scheme not in {'package', 'file'}:
@@ -166,7 +167,7 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
 
 
 def mesh_unit(path: Path) -> float:
-    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention."""
+    """Return the unit of a mesh in [m]: COLLADA states it, other formats use [m] by convention."""
     if path.suffix.lower() != '.dae':
         return 1.0
     found = COLLADA_UNIT.search(path.read_bytes())
@@ -177,7 +178,7 @@ def mesh_unit(path: Path) -> float:
 
 
 def find_package(name: str, folder: Path | None = None) -> Path:
-    """Find the folder of a package: beside the description, or installed.
+    """Find the folder of a package: beside the description, else installed.
 
     Raises:
         MeshFileError: There is no such package.

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The network interfaces that DDS uses: loopback, and those that the user names.
+"""Restricts DDS to loopback and the network interfaces that the user names.
 
-DDS of Fast DDS has no authentication: all who reach its sockets can call every service. So a
+Fast DDS has no authentication: any host that reaches its sockets can call every service. So a
 process of this workspace opens UDP sockets on the loopback interface only, unless the variable
 ``DDS_NETWORK``, or the option ``--network`` of a bring-up, names interfaces or peers.
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Environment variables and the profile by which Fast DDS and rmw learn what to use."""
+"""Sets the environment variables and the profile that configure Fast DDS and rmw."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
 
 
 def profile_file(reach: Reach) -> Path:
-    """Return the file of a profile beyond loopback; write it if it does not exist.
+    """Return the profile file of a reach beyond loopback; write it if it does not exist.
 
     Raises:
         NetworkChoiceError: It cannot be written.
@@ -46,7 +46,7 @@ def profile_file(reach: Reach) -> Path:
 
 
 def profile_text(reach: Reach) -> str:
-    """Return a profile as XML; arguments as of :func:`profile_file`."""
+    """Return a profile as XML; arguments as for :func:`profile_file`."""
     from xml.etree import ElementTree as ET
 
     ET.register_namespace('', _NAMESPACE)
@@ -75,7 +75,7 @@ def _add(parent: ET.Element, tag: str) -> ET.Element:
 
 
 def _private(folder: Path) -> Path:
-    """Make a folder that this user alone can write to; refuse one that another user has made."""
+    """Create a folder that only this user can write to; reject one that another user created."""
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
@@ -96,7 +96,7 @@ def _write(path: Path, text: str) -> Path:
 
 
 NETWORK_VARIABLE = 'DDS_NETWORK'
-"""Interfaces and peers that a person opens DDS to; empty or unset for none."""
+"""Interfaces and peers that the user opens DDS to; empty or unset for none."""
 PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 """File that Fast DDS 2 reads its default profile from."""
 RANGE_VARIABLE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -118,7 +118,7 @@ def is_own_profile(path: str) -> bool:
 
 
 def own_transports(environ: Mapping[str, str]) -> str:
-    """Return the variable with which the user configures the transports; empty without one."""
+    """Return the variable by which the user configures DDS transports; empty without one."""
     rmw, profile = environ.get(_RMW_VARIABLE, ''), environ.get(PROFILE_VARIABLE, '')
     if rmw and not rmw.startswith(_FAST_DDS):
         return f'{_RMW_VARIABLE}={rmw}'
@@ -129,7 +129,8 @@ def selected_reach(environ: Mapping[str, str]) -> Reach:
     """Return the reach that the user has chosen.
 
     Raises:
-        NetworkChoiceError: A name does not exist, or the user's own transports would ignore it.
+        NetworkChoiceError: A name does not exist, or the user's own transports override the
+            choice.
     """
     own, text = own_transports(environ), environ.get(NETWORK_VARIABLE, '').strip()
     if not text:
@@ -143,7 +144,7 @@ def selected_reach(environ: Mapping[str, str]) -> Reach:
 
 
 def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
-    """Return the variables that keep DDS to a reach; none where the user has own transports.
+    """Return the variables that restrict DDS to a reach; none if the user has own transports.
 
     Raises:
         NetworkChoiceError: The profile cannot be written.
@@ -164,8 +165,8 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
 def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
     """Restrict DDS of this process and its children to the reach that the user has chosen.
 
-    Call it before rclpy.init, as Fast DDS reads its profile once. The environment, ``os.environ``
-    or that of a process to start, is changed.
+    Call it before rclpy.init, as Fast DDS reads its profile once. It changes the environment,
+    ``os.environ`` or that of a process to start.
     """
     reach = selected_reach(environ)
     environ.update(dds_variables(environ, reach))
@@ -173,12 +174,12 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
 
 
 def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
-    """Do the same for a program with the option ``--network``, which overrides the variable."""
+    """Restrict DDS for a program with the option ``--network``, which overrides the variable."""
     if names is not None:
         environ[NETWORK_VARIABLE] = names
     return restrict_dds(environ).describe()
 
 
 def is_this_host(environ: Mapping[str, str]) -> bool:
-    """Return whether DDS of a process with this environment reaches this host only."""
+    """Return whether DDS of a process with this environment reaches only this host."""
     return selected_reach(environ).is_this_host

@@ -14,7 +14,7 @@ import socket
 import struct
 
 LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
-"""The profile with loopback alone; all others are made from it."""
+"""The profile with loopback only; all others are derived from it."""
 PREFIX = 'dds_network_'  # how the file of every profile of this package begins
 
 _SIOCGIFFLAGS = 0x8913
@@ -51,9 +51,9 @@ def read_interfaces() -> dict[str, str]:
 
 
 def participants_on_this_host(domain: int) -> int:
-    """Return how many participants of a domain have a socket on this host, ROS or not.
+    """Return the number of DDS participants of a domain on this host, ROS or not.
 
-    Each has a port for discovery by unicast (DDSI-RTPS 9.6.2.3), unless its user gave it another.
+    Counts the default ports for unicast discovery (DDSI-RTPS 9.6.2.3).
     """
     ports = range(_DOMAIN_PORT + domain * _PORTS, _DOMAIN_PORT + (domain + 1) * _PORTS, 2)
     lines = Path('/proc/net/udp').read_text().splitlines()[1:]
@@ -62,7 +62,7 @@ def participants_on_this_host(domain: int) -> int:
 
 
 def has_link(name: str) -> bool:
-    """Return whether an interface is operational: no cable is missing, no access point."""
+    """Return whether an interface is operational: its cable or access point is connected."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             answer = fcntl.ioctl(probe, _SIOCGIFFLAGS, _request(name))
@@ -106,7 +106,7 @@ class Interface:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What DDS uses besides loopback."""
+    """Interfaces and peers that DDS uses besides loopback."""
 
     interfaces: tuple[Interface, ...] = ()  # interfaces on which its sockets receive
     # IPv4 addresses that it announces itself to, for networks without multicast
@@ -123,7 +123,7 @@ class Reach:
         return not self.interfaces and not self.own_transports
 
     def describe(self) -> str:
-        """Return a sentence on what is open and what that means."""
+        """Describe what is open and the consequence."""
         if own := self.own_transports:
             return f'{own} decides which networks DDS uses; it may be open to all of them'
         left_out = ''.join(
@@ -152,10 +152,9 @@ def resolve_reach(
     Args:
         text: Names of interfaces, and addresses or names of peers, separated by commas or blanks;
             empty or ``localhost`` for none.
-        interfaces: The IPv4 addresses of this host by the name of their interface; empty for one
-            without.
+        interfaces: IPv4 address of each interface of this host by name; empty if it has none.
         resolve_host: Returns the IPv4 address of a host name.
-        source_address: Returns the address of this host that faces a peer.
+        source_address: Returns the address of this host on the route to a peer.
         has_link: Returns whether an interface is operational.
 
     Raises:

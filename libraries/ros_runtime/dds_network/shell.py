@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The variables of this package as shell commands, for env.sh to evaluate."""
+"""Prints the variables of this package as shell commands, which env.sh evaluates."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
 
 
 def _is_elsewhere(servers: str) -> bool:
-    """Whether a list of discovery servers, ADDRESS[:PORT] each, has one off loopback."""
+    """Whether a list of discovery servers (ADDRESS[:PORT]) has one beyond loopback."""
     addresses = (each.strip() for each in servers.split(';'))
     return any(each and not each.startswith(('127.', 'localhost')) for each in addresses)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frequent messages as serialized bytes in which only the stamp and numbers change."""
+"""Serializes frequent messages fast: only stamp and numbers are written into fixed bytes."""
 
 from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate, stamp_of
 

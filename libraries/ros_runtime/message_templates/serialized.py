@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frequent messages: serialized once; afterwards only the stamp and numbers are written or read.
+"""Serializes frequent messages once; then only writes or reads the stamp and numbers.
 
-To make a message object of ROS, or to have rclpy take one apart, costs several times as much as
-everything that a controller computes for it. So one message of a form is serialized with marks in
-place of its numbers; where the marks are found, the numbers of all others stand.
+Creating a ROS message object, or deserializing one by rclpy, costs several times as much as all
+that a controller computes for it. So one message of a form is serialized with marker values as
+numbers; the positions of the markers are those of the numbers in all other messages.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ _HEADER = 4  # where the message itself begins [B]
 
 @dataclass(frozen=True, slots=True)
 class MessageTemplate:
-    """The form of messages that differ in their stamp and numbers only."""
+    """Template of messages that differ only in their stamp and numbers."""
 
     make: Callable[..., Any]  # of stamp, numbers, and the arguments
     count: int  # how many numbers a message takes
     arguments: tuple[Hashable, ...] = ()  # what does not change from one message to the next
 
     def message(self, stamp: Time, numbers: Sequence[float]) -> Any:  # noqa: ANN401  any message
-        """Make a message; each number stands in it as it is, once or several times."""
+        """Create a message; each number appears in it unchanged, once or several times."""
         return self.make(stamp, numbers, *self.arguments)
 
 
 @dataclass(frozen=True, slots=True)
 class _Gap:
-    """A number in the bytes of a message."""
+    """Position of a number in the bytes of a message."""
 
     place: int  # [B]
     letter: str  # of its format
@@ -52,7 +52,7 @@ class _Gap:
 
 
 class _Pieces:
-    """The bytes of a message, cut into numbers and what stands between them, which is constant."""
+    """The bytes of a message, split into numbers and the constant bytes between them."""
 
     def __init__(self, data: bytes, gaps: Sequence[_Gap]) -> None:
         order, at, layout = _order(data), 0, ''
@@ -83,7 +83,7 @@ def _marks(count: int) -> list[float]:
 
 
 def _gaps(data: bytes, count: int) -> list[_Gap]:
-    """Find marks of a stamp, and of so many numbers, which count from 2 on."""
+    """Find the markers of a stamp and of ``count`` numbers; markers count up from 2."""
     values = [('i', _SECONDS_MARK), ('I', _NANOSECONDS_MARK), *(('df', m) for m in _marks(count))]
     gaps = []
     for index, (letters, mark) in enumerate(values):
@@ -109,10 +109,10 @@ class SerializedTemplate:
     """The bytes of a message, with gaps for its stamp and numbers."""
 
     def __init__(self, form: MessageTemplate) -> None:
-        """Make the first message and find its numbers.
+        """Serialize a first message and locate its numbers.
 
         Raises:
-            ValueError: The form does not put its stamp or one of its numbers into the message.
+            ValueError: The form omits its stamp or one of its numbers from the message.
         """
         stamp = Time(sec=_SECONDS_MARK, nanosec=_NANOSECONDS_MARK)
         data = bytes(serialize_message(form.message(stamp, _marks(form.count))))
@@ -123,7 +123,7 @@ class SerializedTemplate:
         self._arrange = itemgetter(*order)
 
     def fill(self, time: int, numbers: Sequence[float]) -> bytes:
-        """Return the serialized message of a time [ns] and numbers.
+        """Return the serialized message with a stamp in [ns] and numbers.
 
         Raises:
             OverflowError: A number does not fit a float32.
@@ -133,15 +133,15 @@ class SerializedTemplate:
 
 
 class FastPublisher:
-    """A topic on which messages of few forms are published often."""
+    """Publishes messages of few forms at a high rate."""
 
     def __init__(self, publisher: Publisher) -> None:
-        """Publish there."""
+        """Publish with an rclpy publisher."""
         self._publisher = publisher
         self._templates: dict[MessageTemplate, SerializedTemplate] = {}
 
     def publish(self, form: MessageTemplate, time: int, numbers: Sequence[float]) -> None:
-        """Publish a message of a form, with a time [ns] and numbers."""
+        """Publish a message of a form, with a stamp in [ns] and numbers."""
         template = self._templates.get(form)
         if template is None:
             template = self._templates[form] = SerializedTemplate(form)
@@ -149,22 +149,22 @@ class FastPublisher:
 
 
 def stamp_of(data: bytes) -> int:
-    """Return the stamp [ns] of a serialized message that begins with its header."""
+    """Return the stamp in [ns] of a serialized message that begins with its header."""
     seconds, nanoseconds = struct.unpack_from(_order(data) + 'iI', data, _HEADER)
     return int(seconds * NANOSECONDS + nanoseconds)
 
 
 class FastReader:
-    """Reads serialized messages, of a subscription with ``raw=True``, with a header.
+    """Reads serialized messages with a header, from a subscription with ``raw=True``.
 
-    As long as nothing but stamp and numbers changes, only these are looked at; everything else
-    is read in full. Publishers that never send the same form twice are read in full always.
+    While only stamp and numbers change, it reads just these; any other message is deserialized in
+    full. So are all messages of a publisher that never sends the same form twice.
     """
 
     def __init__(self, kind: type, *paths: str) -> None:
-        """Create a reader for the numbers at paths in messages of a kind.
+        """Create a reader for the numbers at ``paths`` in messages of a type.
 
-        They lead to attributes that are a float or a sequence of these, as ``twist.linear.x``.
+        A path such as ``twist.linear.x`` names a float or a sequence of floats.
         """
         self._kind = kind
         self._paths = [path.split('.') for path in paths]
@@ -177,8 +177,8 @@ class FastReader:
         """Read a message.
 
         Returns:
-            A message that is right but for its stamp and numbers, the same one as long as these
-            alone change; and the numbers, path by path.
+            A message, valid except for its stamp and numbers, and the same object while only these
+            change; and the numbers, path by path.
         """
         if self._unpack is not None and len(data) == self._unpack.size:
             pieces = self._unpack.unpack(data)
@@ -196,7 +196,7 @@ class FastReader:
         return message, numbers
 
     def _learn(self, data: bytes, message: Any, count: int) -> None:  # noqa: ANN401
-        """Remember where the numbers are, if our own serialization has them at the same places."""
+        """Store where the numbers are, if our own serialization has the same layout."""
         marked, marks = deepcopy(message), iter(_marks(count))
         marked.header.stamp = Time(sec=_SECONDS_MARK, nanosec=_NANOSECONDS_MARK)
         for path in self._paths:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the programs of all nodes share: start, end, and refusal of parameters in words."""
+"""Shared by all node programs: start, shutdown, and readable errors for wrong parameters."""
 
 from .deferred_service import create_deferred_service
 from .discovery import discover_other_nodes, other_nodes, ServerMatch

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Action goals that a control loop carries out, so that no callback waits for their end."""
+"""Action goals that a control loop executes, so that no callback waits for their end."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ RESULT_TIMEOUT = 10.0
 """Time in [s] that an ended goal is kept for late requests, as by rcl; rclpy keeps it for 900."""
 
 ANSWER_DELAY = 0.02
-"""Least time in [s] from a request to its answer.
+"""Minimum time in [s] from a request to its answer.
 
-Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
-before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms, and with
-several of them, or on a busy computer, it takes some switches. Cancel requests are not delayed,
-because the motion would go on meanwhile. The record of a goal is made when its request comes, so
-that a stop during the delay counts for it.
+Clients of rclpy 7.1 register a request only after sending it, and drop an answer that another
+thread receives before: 1 of 40 motions of pymoveit2 hung. Python switches threads every 5 ms, and
+with several threads, or on a busy computer, it takes some switches. Cancel requests are not
+delayed, because the motion would go on meanwhile. The record of a goal is made when its request
+comes, so that a stop during the delay counts for it.
 """
 
 REPEATS = (2.0, 3.0)
 """Pauses in [s] after which acceptance is sent again while no result has been requested.
 
-Longer than clients are held up: one that finds two of them ends with an error of rclpy's.
-A client that requests the result has the acceptance. On a busy computer its thread may pause
-for longer than ``ANSWER_DELAY`` between sending and noting. A client that has it and never
-requests a result drops the repeats with a warning.
+Longer than clients are held up: one that finds two of them ends with an error of rclpy's. A client
+that requests the result has received the acceptance. On a busy computer its thread may pause for
+longer than ``ANSWER_DELAY`` between sending and registering. A client that has the acceptance, but
+never requests a result, drops the repeats with a warning.
 """
 
 RESULT_RATIO, LONGEST_DELAY = 4.0, 0.5
-"""A result leaves so many times later than its request as that came after its goal, less the
-delay; [s] at most. Nothing shows that a result was noted; this ratio shows how long threads pause.
+"""Delay of a result: ratio times (time from goal to result request, less ``ANSWER_DELAY``), and
+its maximum in [s]. No message confirms a result; that time shows how long threads pause.
 """
 
 
 class _Server(ActionServer):
-    """Answers when the client has noted its request, see ``ANSWER_DELAY`` and ``REPEATS``."""
+    """Answers after the client has registered its request, see ``ANSWER_DELAY``, ``REPEATS``."""
 
     def __init__(
         self,
@@ -60,9 +60,9 @@ class _Server(ActionServer):
         cancel_received: Callable[[], None],
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        """Call with each goal when it comes, when it was accepted or not, and to cancel all."""
+        """Callbacks: a goal was received; its answer was sent; the client cancels all goals."""
         self._came_at: dict[bytes, float] = {}
-        """When goals came whose result was not yet requested [s]."""
+        """Arrival times in [s] of goals whose result was not yet requested."""
         self._receive, self._forget = receive, forget
         self._cancel_received = cancel_received
         super().__init__(*args, **kwargs)
@@ -118,8 +118,8 @@ class _Server(ActionServer):
     ) -> None:
         """Run a coroutine after a time in [s].
 
-        It must not wait itself: rclpy's EventsExecutor resumes one that waits as often as it can,
-        which takes a core. A timer is not destroyed in its callback, which may be queued twice.
+        The coroutine must not wait: rclpy's EventsExecutor busy-polls a waiting coroutine, which
+        takes a core. A timer is not destroyed in its callback, which may be queued twice.
         """
 
         async def begin() -> None:
@@ -140,15 +140,15 @@ class _Server(ActionServer):
 
 
 class GoalClient(ActionClient):
-    """A client that takes an acceptance twice.
+    """An action client that tolerates a repeated acceptance.
 
-    Servers of actions here repeat it where no result is requested soon. On a busy computer both
-    wait; rclpy raises RuntimeError for the second, and its EventsExecutor ends by SIGSEGV when a
-    task raises.
+    Our action servers repeat it if no result is requested soon. On a busy computer both may be
+    queued; rclpy raises RuntimeError for the second, and its EventsExecutor crashes (SIGSEGV) when
+    a task raises.
     """
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
-        """Process what came, without the repeat."""
+        """Process the received data, without a repeated acceptance."""
         sequence, _ = taken_data.get('goal', (None, None))
         goal_id = self._goal_sequence_number_to_goal_id.get(sequence)
         if goal_id is not None and bytes(goal_id.uuid) in self._goal_handles:
@@ -157,7 +157,7 @@ class GoalClient(ActionClient):
 
 
 class Ending(Enum):
-    """Status with which a goal ends."""
+    """Final status of a goal."""
 
     SUCCEEDED = 'succeeded'
     CANCELED = 'canceled'  # aborted, unless a client has asked for it
@@ -166,7 +166,7 @@ class Ending(Enum):
 
 @dataclass(slots=True, eq=False)
 class ServedGoal:
-    """A goal from its request to its result; servers derive from it what they remember."""
+    """A goal from its request to its result; servers derive their goal records from it."""
 
     handle: Any = field(default=None, init=False)  # rclpy's ``ServerGoalHandle``, once accepted
     is_canceled_early: bool = field(default=False, init=False)  # canceled before its acceptance
@@ -195,21 +195,21 @@ class GoalServer(Generic[GoalT]):
         refusals: tuple[type[Exception], ...] = (),
         has_stopped: Callable[[GoalT], bool] = lambda _: True,
     ) -> None:
-        """Offer the action; all callbacks run in the executor, and none of them ends it.
+        """Create the action server; callbacks run in the executor and never end it.
 
         Args:
-            accept: Makes the record of a goal when its request comes: what was stopped since
-                then must not begin.
-            start: Begins with a goal, ``ANSWER_DELAY`` after its request.
-            cancel: Begins to end a goal that a client cancels; where it raises, the client's
-                request is rejected.
+            accept: Creates the record of a goal when its request arrives: a goal stopped after
+                that must not begin.
+            start: Starts a goal, ``ANSWER_DELAY`` after its request.
+            cancel: Starts the cancellation of a goal by a client; if it raises, the request is
+                rejected.
             conclude: Returns status and result message of a goal that has ended.
-            fail: Returns the result message, with code and reason, of a goal that is aborted for
-                what ``start``, ``conclude`` or a :meth:`watch` has raised.
-            refusals: What ``start`` raises for goals that cannot be carried out; anything else is
-                a defect, and has its traceback in the log.
-            has_stopped: Whether what was begun for a goal stands still: a goal for which a
-                :meth:`watch` has raised is canceled, and answered then.
+            fail: Returns the result message, with code and reason, of a goal that is aborted
+                because ``start``, ``conclude`` or a :meth:`watch` raised.
+            refusals: Exceptions of ``start`` for goals that cannot be executed; any other is a
+                defect, logged with its traceback.
+            has_stopped: Whether the motion of a goal has stopped: a goal whose :meth:`watch`
+                raised is canceled, and answered then.
         """
         self._received: dict[bytes, GoalT] = {}  # goals that are not accepted yet
         self._goals: dict[bytes, GoalT] = {}
@@ -238,9 +238,9 @@ class GoalServer(Generic[GoalT]):
         return [goal for goal in self._goals.values() if not goal.has_ended]
 
     def watch(self, look: Callable[[GoalT], None]) -> None:
-        """Look at each goal that has not ended; one for which that raises is canceled and aborted.
+        """Call ``look`` for each running goal; cancel and abort a goal for which it raises.
 
-        It is answered once what was begun for it stands still, or cannot be asked whether it does.
+        That goal is answered once its motion has stopped, or if that cannot be determined.
         """
         for goal in self.running:
             try:
@@ -262,13 +262,13 @@ class GoalServer(Generic[GoalT]):
             self.end(goal)
 
     def end(self, goal: GoalT) -> None:
-        """Answer a goal with what ``conclude`` returns; once, always from the same thread."""
+        """Answer a goal with the result of ``conclude``; once, always in the same thread."""
         if not goal.has_ended:
             goal.has_ended = True
             self._server.notify_execute(goal.handle, None)  # leads to _answer
 
     def destroy(self) -> None:
-        """Withdraw the action; goals are answered no more."""
+        """Destroy the action server; pending goals get no answer."""
         self._server.destroy()
 
     def _receive(self, uuid: bytes) -> None:

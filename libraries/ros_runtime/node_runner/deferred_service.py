@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A service whose responses are sent later: no callback of the executor waits for them.
 
-rclpy sends a response when the callback returns. Coroutine callbacks are no way out: in Jazzy the
-events executor does not run them, the single-threaded one runs them one after another.
+rclpy sends a response when the callback returns. Coroutine callbacks do not help: in Jazzy the
+events executor does not run them, and the single-threaded one runs them one by one.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ def create_deferred_service(
     *,
     post: Callable[[Callable[[], None]], None] = lambda work: work(),
 ) -> Service:
-    """Create a service; its response is sent when a future is done.
+    """Create a service that sends its response when a future is done.
 
-    What is still on its way when the node is to end is finished or cancelled before the node is
-    destroyed; a cancelled request is not answered.
+    The caller finishes or cancels pending futures before it destroys the node; a cancelled request
+    gets no answer.
 
     Args:
-        begin: Called in the executor with each request; returns the future of its outcome. What
-            it raises is an outcome, too.
-        respond: Called with an empty response and the outcome; returns what is sent. By default
-            the outcome is the response. What it raises is logged, and the client gets the first
-            response as it is then.
-        post: Has responses made and sent in a thread of the caller's; by default that happens
-            where the future is finished.
+        begin: Called in the executor with each request; returns the future of its outcome. Its
+            exception is an outcome, too.
+        respond: Called with an empty response and the outcome; returns the response to send. By
+            default the outcome is the response. If it raises, that is logged, and the empty
+            response is sent as filled in so far.
+        post: Runs ``respond`` and the sending in a thread of the caller's choice; by default in
+            the thread that finishes the future.
     """
 
     def receive(request: Any, response: Any) -> tuple[Any, Future[Any]]:  # noqa: ANN401

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Discovers other nodes, by name, and whether their services have matched our clients."""
+"""Discovers other nodes by name, and checks if their services have matched our clients."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[st
 def discover_other_nodes(
     node: Node, names: Iterable[str], own: Sequence[str], stop: threading.Event
 ) -> list[str]:
-    """Wait until discovery is over, or one of the nodes is found; return those found."""
+    """Wait until discovery is complete or a node is found; return the nodes found."""
     wanted, deadline = set(names), time.monotonic() + DISCOVERY_TIME
     while time.monotonic() < deadline and not stop.wait(_LOOK_PERIOD):
         if found := other_nodes(node, wanted, own):
@@ -42,17 +42,16 @@ def discover_other_nodes(
 
 
 class ServerMatch:
-    """Whether the nodes that offer services have matched the clients of a node.
+    """Checks whether the nodes that offer services have matched the clients of a node.
 
-    A server is found before it has found the client, and rmw_fastrtps drops the answer when that
-    takes it more than 0.1 s, as on a busy machine. A request must not be repeated that moves
-    something. But DDS announces readers in the order in which they were made: once an answer has
-    come to a client that was made later, and whose request may be repeated, the others are
-    matched, too.
+    A client discovers a server before the server discovers the client; if that takes over 0.1 s,
+    as on a busy machine, rmw_fastrtps drops the answer. A request that moves something must not be
+    repeated. But DDS announces readers in order of creation: once a client that was created later,
+    with a repeatable request, gets an answer, the others are matched, too.
     """
 
     def __init__(self, node: Node, services: Iterable[str]) -> None:
-        """Begin; the node has already created its clients of these services."""
+        """Prepare; the node has already created its clients of these services."""
         self._node = node
         self._services = {node.resolve_service_name(name) for name in services}
         self._probes: dict[str, Client] = {}
@@ -60,9 +59,9 @@ class ServerMatch:
         self._asked = -math.inf
 
     def advance(self) -> bool:
-        """Go on, while the node is served; return True when all have matched.
+        """Continue the check while the node is spun; return True when all have matched.
 
-        A node without services of parameters cannot be asked, and counts.
+        A node without parameter services cannot be checked, and counts as matched.
         """
         if self._services:
             self._find_servers()

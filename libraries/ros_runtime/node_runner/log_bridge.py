@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Records of Python's ``logging`` appear in the log of ROS, console and /rosout.
+"""Forwards records of Python's ``logging`` to the ROS log: console and /rosout.
 
 The layers without ROS (bus, cycle, serial link) log with ``logging``. Their threads must not wait
-for DDS, so that the record goes into a queue and another thread logs it.
+for DDS, so records are queued, and another thread logs them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BURST = 10  # records of one source within a window
 WINDOW = 1.0  # [s]
 
 QUEUE_LENGTH = 500
-"""Records that wait for the thread that logs; more than these are counted and dropped."""
+"""Maximum number of queued records; further ones are counted and dropped."""
 
 
 @dataclass(slots=True)
@@ -56,7 +56,7 @@ class LogRateLimit:
         return True
 
     def collect(self, now: float) -> dict[Hashable, int]:
-        """End the windows that are over; return how many records each source lost in them."""
+        """Close expired windows; return how many records of each source were dropped in them."""
         over = [
             source
             for source, window in self._windows.items()
@@ -72,10 +72,10 @@ class LogRateLimit:
 
 
 class RosLogBridge(logging.Handler):
-    """Logs what the handlers of ``logging`` get, in a thread of its own.
+    """Logs the records of ``logging`` to ROS, in its own thread.
 
-    Records are those of a node from :meth:`attach` on, which brings them to /rosout; before it
-    they reach the console only.
+    From :meth:`attach` on, records are logged by a node and reach /rosout; before it, they reach
+    only the console.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class RosLogBridge(logging.Handler):
         limit: LogRateLimit | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare; :meth:`start` begins. The name is that of the log until there is a node."""
+        """Prepare without logging; ``name`` is the logger name until a node is attached."""
         super().__init__(logging.WARNING)
         self._logger = get_logger(name)
         self._attached = False
@@ -103,7 +103,7 @@ class RosLogBridge(logging.Handler):
         logging.getLogger().addHandler(self)
 
     def attach(self, node: Node) -> None:
-        """Log as a node, if none is attached."""
+        """Log as this node, unless one is already attached."""
         if not self._attached:
             self._attached = True
             self._logger = node.get_logger()
@@ -121,7 +121,7 @@ class RosLogBridge(logging.Handler):
         self._wake.set()
 
     def close(self) -> None:
-        """Log what is queued, and end."""
+        """Log the queued records, and end."""
         logging.getLogger().removeHandler(self)
         if self._thread.is_alive():
             self._closing = True
@@ -155,7 +155,7 @@ class RosLogBridge(logging.Handler):
 def log_as(node: Node) -> None:
     """Log the records of this process's ``logging`` as those of a node.
 
-    Only the first node of a process counts. Without :func:`.run_program` nothing happens.
+    Only the first node of a process counts. Without :func:`.run_program` it does nothing.
     """
     for handler in logging.getLogger().handlers:
         if isinstance(handler, RosLogBridge):

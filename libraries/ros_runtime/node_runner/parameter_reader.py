@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Declares parameters with meaning and range; reads their values or refuses them."""
+"""Declares parameters with description and range; reads and checks their values."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ _ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold on
 class ParameterError(ValueError):
     """A parameter of a node is misspelt, or its value is not allowed.
 
-    Scenarios: a text where a number belongs, a rate beyond its range, a choice that there is not.
+    Scenarios: a text instead of a number, a rate out of range, an unknown choice.
     """
 
 
 def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
-    """Refuse a parameter that looks like one of a node's; rclpy would ignore it.
+    """Reject a parameter with a name similar to one of the node's; rclpy would ignore it.
 
-    Others are left alone: a parameter file may be for several nodes. ``similar`` are names of
-    other programs that look like one by chance; the node has declared all its parameters.
+    Other unknown names pass: a parameter file may be for several nodes. ``similar`` are names of
+    other programs that look alike by chance. Call it after all parameters are declared.
 
     Returns:
-        The names that were given and that the node has not; they have no effect on it.
+        The given names that the node has not declared; they have no effect on it.
 
     Raises:
-        ParameterError: There is one; the message names the likely one.
+        ParameterError: A name looks misspelt; the message suggests the right one.
     """
     given = node._parameter_overrides  # noqa: SLF001  # there is no public way to read it
     unknown = [
@@ -60,10 +60,10 @@ def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
 
 
 def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse a name that looks like a known one.
+    """Reject an unknown name that looks like a known one.
 
     Raises:
-        ParameterError: There is one; the message names the likely one.
+        ParameterError: A name looks misspelt; the message suggests the right one.
     """
     names = list(known)
     for name in sorted(unknown):
@@ -77,24 +77,23 @@ def closest(name: str, names: Iterable[str], alike: float = ALIKE) -> str:
 
 
 class ParameterReader:
-    """Declares one parameter after the other.
+    """Declares the parameters of a node and returns their values.
 
-    Every method raises :class:`.ParameterError` when the value that was given is of another kind
-    or out of its range; the message has name, value and what it must be. A whole number does for
-    any number.
+    Every method raises :class:`.ParameterError` if the given value has the wrong type or is out of
+    range; the message has name, value and what is allowed. An integer is accepted for any number.
     """
 
     def __init__(self, node: Node, prefix: str = '', *, fixed: bool = True) -> None:
         """Declare for a node, with a prefix and its dot before each name.
 
-        ``fixed`` ones are read at the start only, and cannot be changed later.
+        ``fixed`` parameters are read only at the start, and cannot be changed later.
         """
         self._node = node
         self._prefix = prefix
         self._fixed = fixed
 
     def settings(self, kind: type[Kind], prefix: str = '', **given: Any) -> Kind:  # noqa: ANN401
-        """Declare and read the typed settings of a dataclass; given ones are not declared."""
+        """Declare and read the settings of a dataclass, except those ``given``; return it."""
         values = given
         for name, default, span, meaning in settings_of(kind):
             path = prefix + name
@@ -144,7 +143,7 @@ class ParameterReader:
         return read
 
     def texts(self, name: str, default: list[str], meaning: str) -> list[str]:
-        """Declare and read a list of texts; the default is never empty, which has no type."""
+        """Declare and read a list of texts; an empty default is not possible: it has no type."""
         read = self._given(name, default, _texts)
         self._declare(name, read or Parameter.Type.STRING_ARRAY, meaning)
         return read
@@ -156,7 +155,7 @@ class ParameterReader:
         values: Mapping[str, Choice],
         meaning: str,
     ) -> Choice:
-        """Declare and read one of several names; return what it stands for."""
+        """Declare and read one of several names; return its entry in ``values``."""
         chosen, full = self._given(name, default, _text), self._prefix + name
         self._declare(name, chosen, f'{meaning} ({", ".join(values)})')
         if chosen not in values:
@@ -166,7 +165,7 @@ class ParameterReader:
         return values[chosen]
 
     def _given(self, name: str, default: object, check: Callable[[str, object], Value]) -> Value:
-        """Return the value from outside or else the default, checked."""
+        """Return the given value, else the default, after a check."""
         name = self._prefix + name
         given = self._node._parameter_overrides.get(name)  # noqa: SLF001  # no public way to read it
         return check(name, default if given is None else given.value)
@@ -246,15 +245,15 @@ def _or(words: list[str]) -> str:
 
 
 def given_values(node: Node) -> dict[str, object]:
-    """Return all parameters that a node was given from outside, declared or not, by name."""
+    """Return all parameter overrides of a node by name, declared or not."""
     given = node._parameter_overrides  # noqa: SLF001  # no public way to read it
     return {name: parameter.value for name, parameter in given.items()}
 
 
 def give_defaults(node: Node, values: Mapping[str, object]) -> None:
-    """Set parameters of a node that were not given, as if they came from outside.
+    """Add parameter overrides to a node for names that were not given.
 
-    The node has not declared them yet. Values of kinds that no parameter has are passed over.
+    Call it before they are declared. Values of types that no parameter has are skipped.
     """
     given = node._parameter_overrides  # noqa: SLF001
     for name, value in values.items():
@@ -267,7 +266,7 @@ def give_defaults(node: Node, values: Mapping[str, object]) -> None:
 
 
 def declare_given(node: Node, names: Iterable[str], meaning: str) -> None:
-    """Declare parameters that were given and are not declared yet, as they are."""
+    """Declare parameters that were given but not declared yet, with their given values."""
     given = node._parameter_overrides  # noqa: SLF001
     for name in names:
         if name in given and not node.has_parameter(name):

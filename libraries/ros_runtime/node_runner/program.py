@@ -46,8 +46,8 @@ def destroyed_when_refused(
 ) -> Constructor[AnyNode, Arguments]:
     """Decorate the ``__init__`` of a node: when it raises, the node is destroyed first.
 
-    rclpy enters a node into the graph at the beginning of its constructor, and its participant
-    answers as long as the process lives, whatever became of the object.
+    rclpy adds a node to the graph at the start of its constructor, and the participant answers as
+    long as the process lives, even if the constructor fails.
     """
 
     @wraps(construct)
@@ -60,10 +60,10 @@ def destroyed_when_refused(
 
 @contextmanager
 def destroyed_if_refused(node: AnyNode) -> Iterator[AnyNode]:
-    """Destroy a node when what follows raises; else it stays.
+    """Destroy a node if the block raises, else keep it.
 
-    For functions that make nodes of the class ``Node`` and then read their parameters; in an
-    ``ExitStack`` where there are several.
+    For functions that create a plain ``Node`` and then read its parameters; use an ``ExitStack``
+    for several nodes.
     """
     try:
         yield node
@@ -81,7 +81,7 @@ def _destroy(node: Node) -> None:
 
 
 def declare_black_box(read: ParameterReader) -> BlackBoxSettings | None:
-    """Declare ``black_box_window`` and ``black_box_folder``; return None where it is off."""
+    """Declare ``black_box_window`` and ``black_box_folder``; return None if it is off."""
     window = read.number(
         'black_box_window',
         WINDOW,
@@ -99,7 +99,7 @@ def declare_black_box(read: ParameterReader) -> BlackBoxSettings | None:
 
 
 def declare_thread_priority(read: ParameterReader, default: int) -> int:
-    """Declare ``thread_priority`` as ros2_control has it; return its value."""
+    """Declare ``thread_priority``, as in ros2_control; return its value."""
     return read.whole(
         'thread_priority',
         default,
@@ -109,7 +109,7 @@ def declare_thread_priority(read: ParameterReader, default: int) -> int:
 
 
 def raise_thread_priority(node: Node, priority: int, what: str) -> None:
-    """Raise the priority of the calling thread; a refusal is a warning with the remedy."""
+    """Raise the priority of the calling thread; if refused, log a warning with the remedy."""
     outcome = raise_priority(priority, what)
     if outcome.granted:
         node.get_logger().info(outcome.text)
@@ -125,7 +125,7 @@ def settle_process_memory(node: Node) -> None:
 WAKE_PERIOD = 0.1  # how late the end may be noticed, in [s]
 
 LINGER = 0.3
-"""Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
+"""Time in [s] for an action to handle the end of its goal, and to deliver the result."""
 
 
 SIMULATED_TIME = (
@@ -138,10 +138,10 @@ REPEAT_PERIOD = 10.0  # time in [s] in which the same defect of callbacks is log
 
 
 def make_executor() -> Executor:
-    """Return an events executor where rclpy has one, else a single-threaded one.
+    """Return an events executor if rclpy has one, else a single-threaded one.
 
-    A MultiThreadedExecutor is no choice: in Jazzy it hands queued tasks out again and again
-    while its workers wait for the interpreter lock (rclpy issue 1452).
+    A MultiThreadedExecutor is unsuitable: in Jazzy it dispatches queued tasks repeatedly while its
+    workers wait for the interpreter lock (rclpy issue 1452).
     """
     try:
         from rclpy.experimental.events_executor import EventsExecutor
@@ -158,16 +158,16 @@ def spin(
     linger: float = 0.0,
     survive: Callable[[Exception], None] | None = None,
 ) -> None:
-    """Serve nodes until an event is set, or until ``rclpy.shutdown``.
+    """Spin nodes until an event is set, or until ``rclpy.shutdown``.
 
-    The nodes are still there afterwards; destroying them is up to the caller. Those that were set
-    to simulated time are named once, with what that does not cover.
+    The caller destroys the nodes afterwards. Nodes with simulated time are logged once, with what
+    that does not cover.
 
     Args:
-        stop: Ends it within :data:`WAKE_PERIOD`.
-        executor: What serves them; :func:`make_executor` chooses when it is None.
-        linger: Time for which they are served after that in [s], see :data:`LINGER`.
-        survive: Reports what a callback raised, and the others go on; None raises it here.
+        stop: Ends spinning within :data:`WAKE_PERIOD`.
+        executor: Spins the nodes; None for that of :func:`make_executor`.
+        linger: Time to keep spinning after ``stop`` in [s], see :data:`LINGER`.
+        survive: Called with the exception of a callback, then spinning continues; None raises it.
     """
     executor = executor or make_executor()
     simulated: list[Node] = []
@@ -192,10 +192,10 @@ def spin(
 
 
 def log_defects(node: Node) -> Callable[[Exception], None]:
-    """Return a ``survive`` of :func:`spin` that logs what callbacks raise, with its place.
+    """Return a ``survive`` for :func:`spin` that logs exceptions of callbacks, with their place.
 
-    For programs whose nodes serve several clients or robots while other threads move these: a
-    defect in the answer to one ends neither the others nor the motion.
+    For programs with several clients or robots that other threads move: a defect in the answer to
+    one client ends neither the others nor the motion.
     """
     logged: dict[str, float] = {}
 
@@ -225,9 +225,9 @@ def _spin_once(
 def spin_beside(
     work: Callable[[], None], nodes: Iterable[Node], stop: threading.Event, name: str
 ) -> None:
-    """Serve nodes while a thread works; what it raises is raised here when both have ended.
+    """Spin nodes while a thread works; its exception is raised here when both have ended.
 
-    The event ends both; the work has to end soon after it, and sets it at its own end.
+    The event ends both: ``work`` must end soon after it, and its end sets the event.
     """
     failures: list[Exception] = []
 
@@ -250,7 +250,7 @@ def spin_beside(
 
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Ctrl-C, what stops services, and the closing of the terminal."""
+"""Ctrl-C, the stop of a service, and the closing of the terminal."""
 ECHO_TIME = 0.5
 """A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
@@ -263,18 +263,18 @@ usage: {name} --ros-args -p PARAMETER:=VALUE --params-file FILE
 The README of its package has its parameters; `ros2 param list /{name}` and
 `ros2 param describe /{name} PARAMETER` show them while it runs.
 """
-"""What ``--help`` prints of a program that has no other help."""
+"""Output of ``--help`` for programs without their own help."""
 Body = Callable[[threading.Event], int | None]
 
 
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
-    """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
+    """Initialise rclpy without its signal handlers, with DDS on the networks that the user chose.
 
-    A process that can be reached from outside this host logs so, or that it cannot, though asked.
-    The command line is that of the process by default.
+    It logs if the process is reachable from other hosts, or is not although requested. The command
+    line is that of the process by default.
 
     Raises:
-        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist, or would be ignored.
+        NetworkChoiceError: ``DDS_NETWORK`` names something unknown, or would be ignored.
         RuntimeError: ROS does not accept the arguments, or its environment variables.
     """
     reach = restrict_dds(os.environ)
@@ -291,12 +291,12 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
 def stop_on_signals(
     *, patient: bool = False, clock: Callable[[], float] = monotonic
 ) -> threading.Event:
-    """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
+    """Set an event at the first signal of :data:`ENDING`, without interrupting the program.
 
-    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once, but a ``patient`` one,
-    which has to leave a terminal as it was. A SIGTERM or SIGHUP does not: ``ros2 launch`` and its
-    like send one when the first signal seems to do nothing, while a robot comes to rest. A SIGHUP
-    that is ignored already stays so, as ``nohup`` wants it.
+    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once, except a ``patient``
+    one, which must restore its terminal. A second SIGTERM or SIGHUP does not: ``ros2 launch`` and
+    others send one if the first signal seems to have no effect, while a robot comes to rest. A
+    SIGHUP that is already ignored stays ignored, as ``nohup`` requires.
 
     Initialise rclpy by :func:`.init_ros`; :func:`.run_program` does both.
     """
@@ -319,11 +319,11 @@ def stop_on_signals(
 
 
 def notify_ready(status: str = '') -> None:
-    """Report ``READY=1`` to the supervisor of this process, if it has one that wants to know.
+    """Report ``READY=1`` to the supervisor of this process, if one waits for it.
 
     That is process_supervisor of this workspace, or systemd for a unit of ``Type=notify``. Only
-    the first call reports, so it may stand where readiness comes and goes. The supervisor shows
-    the user the status, one line about this process.
+    the first call reports, so repeated calls are harmless. The supervisor shows the user
+    ``status``, one line about this process.
     """
     address = os.environ.pop(NOTIFY_VARIABLE, '')
     if not address:
@@ -343,16 +343,16 @@ def run_program(
     patient: bool = False,
     help_text: str | None = None,
 ) -> int:
-    """Run a program until it returns; signals end it, and never tear it in the middle.
+    """Run a program until it returns; signals request its end, but never interrupt it.
 
-    Parameters that are refused, arguments that ROS does not understand and the errors named here
-    are one line of the log. Everything else is a defect, and has its traceback. Records of
-    Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`.
+    Rejected parameters, invalid ROS arguments and the given errors are logged as one line. Any
+    other exception is a defect, logged with its traceback. Records of Python's ``logging`` appear
+    in the ROS log, see :class:`.RosLogBridge`.
 
     Args:
-        body: Makes the nodes and serves them; ends soon after the event is set, by Ctrl-C, SIGTERM
-            or the closing of the terminal. May return an exit code.
-        *errors: What else is logged as one line.
+        body: Creates and spins the nodes; ends soon after the event is set, by Ctrl-C, SIGTERM or
+            the closing of the terminal. May return an exit code.
+        *errors: Further exceptions that are logged as one line.
         args: Command line; None for the process's own.
         patient: As in :func:`.stop_on_signals`.
         help_text: Printed for ``--help``, which starts nothing; None for :data:`PLAIN_HELP`.
@@ -397,7 +397,7 @@ def run_node(
     *errors: type[Exception],
     args: Sequence[str] | None = None,
 ) -> int:
-    """Run one node that needs no more than its callbacks; return the exit code.
+    """Run one node that needs only its callbacks; return the exit code.
 
     As :func:`run_program`: the errors are logged as one line when the node cannot be made.
     """

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A process supervisor: starts processes, waits until they are ready, stops them in order.
 
-The decisions are in :mod:`.supervision`, which knows no process, no clock and no signal handler:
-it gets what happened and when, and acts through callables. :mod:`.runner` does it with real
-processes, which :mod:`.fork_server` starts in less time; :mod:`.guardian` stops them in order,
-also when the runner was killed.
+:mod:`.supervision` decides, without processes, clock or signal handlers: it receives timed events,
+and acts through callables. :mod:`.runner` applies it to real processes, which :mod:`.fork_server`
+starts faster; :mod:`.guardian` stops them in order even if the runner was killed.
 
-Around it stands what the bring-ups of all robots need: :mod:`.nodes` finds the executables of ROS
-packages and keeps a second bring-up away, :mod:`.ros_options` reads the arguments that all share,
-:mod:`.terminal` shows what the processes write.
+Further modules serve the bring-ups of all robots: :mod:`.nodes` finds the executables of ROS
+packages and prevents a second bring-up, :mod:`.ros_options` parses shared arguments,
+:mod:`.terminal` shows the output of the processes.
 """
 
 from .fork_server import ForkServer

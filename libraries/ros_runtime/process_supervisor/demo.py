@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A demo beside the processes of its robot: a live table, a summary and an exit code.
+"""Runs a demo beside the processes of its robot, with a live table, summary and exit code.
 
-This module is not imported by the package: a mere bring-up shows no table.
+The package does not import this module: a plain bring-up shows no table.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0
 
 
 class Demo(ABC, Generic[ClientT]):
-    """What a demo does and shows; :func:`run_demo` runs it.
+    """Base class of demos; :func:`run_demo` runs one.
 
     All methods run in one thread beside the supervisor, except :meth:`leave`.
 
     Attributes:
         title: What runs, and where.
         commands: Commands to try in a second terminal.
-        lines: Lines that title and table need; a terminal with fewer shows lines of progress.
-        widest: Columns after which the title line ends.
-        client: The node of the demo, from when it has :attr:`joined` the ROS graph.
-        moving: The robot moves: Ctrl-C is left to :meth:`perform`, which looks at :attr:`left`.
-        summary: Lines of the summary, empty before there is something to report.
-        problems: What went wrong; the exit code is 1 then.
-        warnings: What is worth a look.
+        lines: Lines needed for title and table; a smaller terminal shows lines of progress.
+        widest: Maximum width of the title line in columns.
+        client: The node of the demo, once it has :attr:`joined` the ROS graph.
+        moving: The robot moves: :meth:`perform` handles Ctrl-C, by checking :attr:`left`.
+        summary: Lines of the summary, empty until there is something to report.
+        problems: Failures; with any, the exit code is 1.
+        warnings: Warnings for the summary.
     """
 
     opening = 'starting'
@@ -86,11 +86,11 @@ class Demo(ABC, Generic[ClientT]):
         """Run the demo, from the time the processes are ready until the robot stands still."""
 
     def stopping(self) -> None:
-        """End activities of the demo when the processes begin to stop."""
+        """End the activities of the demo; called when the processes begin to stop."""
 
     @abstractmethod
     def table(self, width: int) -> Sequence[RenderableType]:
-        """Draw the table with a given number of columns, at least 80."""
+        """Draw the table with a width of at least 80 columns."""
 
     @abstractmethod
     def progress(self) -> str:
@@ -98,11 +98,11 @@ class Demo(ABC, Generic[ClientT]):
 
     @property
     def left(self) -> bool:
-        """Whether the user has requested the end."""
+        """Whether the user has requested to quit."""
         return self._ending.is_set()
 
     def leave(self) -> bool:
-        """Request the end, from any thread; return whether the robot has to come to rest first."""
+        """Request to quit, from any thread; return whether the robot must come to rest first."""
         self._ending.set()
         return self.moving
 
@@ -113,7 +113,7 @@ class Demo(ABC, Generic[ClientT]):
             self._screen.enter(phase)
 
     def show(self) -> None:
-        """Draw a new picture, when the last one is old enough."""
+        """Redraw the screen, at a limited rate."""
         now = time.monotonic()
         if self._screen is not None and now >= self._next_picture:
             self._next_picture = now + REFRESH_PERIOD
@@ -123,7 +123,7 @@ class Demo(ABC, Generic[ClientT]):
         """Wait for a condition and redraw the table meanwhile.
 
         Raises:
-            CallError: It did not come within the timeout in [s].
+            CallError: The condition was not met within the timeout in [s].
             GivenUpError: The processes have ended.
         """
 
@@ -134,7 +134,7 @@ class Demo(ABC, Generic[ClientT]):
         self.client.wait_until(reached, timeout, what)
 
     def play(self, runner: Runner, screen: _Screen) -> None:
-        """Perform beside a supervisor, stop it, and show how everything ends."""
+        """Run the demo beside a supervisor, stop it, and show the shutdown."""
         self._screen = screen
         self.enter(self.opening)
         try:
@@ -156,7 +156,7 @@ class Demo(ABC, Generic[ClientT]):
                 self._accompany(lambda: runner.phase is Phase.STOPPED)
 
     def _accompany(self, stopped: Callable[[], bool]) -> None:
-        """Keep the picture alive until everything has ended: drives become disabled in it."""
+        """Keep redrawing until everything has ended, so that drives are shown as disabled."""
         try:
             self.stopping()
             self.enter('stopping')
@@ -170,7 +170,7 @@ class Demo(ABC, Generic[ClientT]):
 
 
 class _Screen:
-    """Where a demo is seen: a live table in a terminal that has room for it, else lines."""
+    """Output of a demo: a live table if the terminal has room for it, else lines."""
 
     def __init__(
         self, demo: Demo[Any], console: Console, write: LineWriter, painter: Painter
@@ -196,7 +196,7 @@ class _Screen:
             self._refresh()
 
     def enter(self, phase: str) -> None:
-        """Show what is going on: in the title, or as a line with the time since the start."""
+        """Show the current phase: in the title, or as a line with the time since the start."""
         self._phase = phase
         if self.live is None:
             self._next_line = time.monotonic() + LINE_PERIOD
@@ -204,13 +204,13 @@ class _Screen:
         self._refresh()
 
     def show(self) -> None:
-        """Draw the latest figures; as a line only every few seconds."""
+        """Draw the latest values; in line mode only every few seconds."""
         if self.live is None and time.monotonic() >= self._next_line:
             self.enter(self._demo.progress())
         self._refresh()
 
     def line(self, name: str, text: str) -> None:
-        """Show what a process wrote when it is a warning or an error, from any thread."""
+        """Show output of a process if it is a warning or an error; thread-safe."""
         severity = severity_of(text)
         if severity is Severity.INFO:
             return
@@ -219,7 +219,7 @@ class _Screen:
         self._keep(severity, f'{name}: {text}')
 
     def notice(self, notice: Notice) -> None:
-        """Show a notice of the supervisor, from any thread."""
+        """Show a notice of the supervisor; thread-safe."""
         if self.live is None:
             self._write(self._painter.notice(notice))
         if notice.lasting:
@@ -230,7 +230,7 @@ class _Screen:
         self._refresh()
 
     def close(self) -> None:
-        """Keep the last table on the screen, without commands that no longer work."""
+        """Leave the last table on the screen, without commands that no longer work."""
         if self.live is not None:
             self._commands, self._notes = [], {}
             self.enter('ended')
@@ -247,7 +247,7 @@ class _Screen:
                 self.live.update(self._picture(size.width, size.height), refresh=True)
 
     def _picture(self, width: int, height: int) -> RenderableType:
-        """Draw title, table, notes, messages, and commands to try, as far as there is room."""
+        """Draw title, table, notes, messages and commands, as far as there is room."""
         demo, now = self._demo, time.monotonic()
         title = Table.grid(expand=False)
         title.width = min(width, demo.widest)
@@ -271,7 +271,7 @@ class _Screen:
 
 
 def second_terminal(commands: Sequence[str]) -> list[str]:
-    """Return commands for a second terminal, preceded by those that connect it to this domain."""
+    """Return commands for a second terminal, with the set-up for this ROS domain first."""
     domain = os.environ.get('ROS_DOMAIN_ID', '')
     first = f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh'
     return [first, *commands]
@@ -286,7 +286,7 @@ def _folded(commands: Sequence[str], width: int) -> list[Text]:
 
 
 def make_table(*columns: tuple[str, int, bool]) -> Table:
-    """Return an empty table: name and least width of each column, and whether it holds numbers."""
+    """Return an empty table; columns are (name, minimum width, whether it holds numbers)."""
     table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
     for name, width, is_number in columns:
         justify = 'right' if is_number else 'left'
@@ -303,7 +303,7 @@ def signed(value: float) -> str:
 def run_demo(demo: Demo[ClientT], processes: Sequence[ProcessSpec], *, endless: bool) -> int:
     """Run a demo in a thread beside the supervisor of its processes.
 
-    An endless one ends at Ctrl-C, and has no summary after a table.
+    An endless demo ends at Ctrl-C, and prints no summary after its table.
 
     Returns:
         0, or 1 when something went wrong.

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the Python programs of a bring-up by forking a process that has imported them all.
+"""Starts the Python programs of a bring-up as forks of a process that has imported them.
 
-Imports are half of what the start of a node costs, and the same for most of them. The server loads
-them once, beside the supervisor's own preparations, and what is not written to stays one memory.
-It has no thread and no ROS context. Each program runs as ``__main__`` with its own session,
-output, variables and command line, as if it were executed; the server is its parent, and reports
-its exit code. What is no Python program of this interpreter is executed as before.
+Imports take half of the start-up time of a node, and most nodes share them. The server loads them
+once, in parallel to the supervisor's preparations, and unmodified memory is shared. It has no
+threads and no ROS context. Each program runs as ``__main__`` with its own session, output,
+variables and command line, as if it were executed; the server is its parent, and reports its exit
+code. Other programs than those of this Python interpreter are executed as usual.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ _BLOCKED = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 
 
 class Forked:
-    """A program that the server has started; as ``subprocess.Popen``."""
+    """A program that the server has started; behaves like ``subprocess.Popen``."""
 
     def __init__(self, server: ForkServer, pid: int) -> None:
         self.pid = pid
         self._server = server
 
     def wait(self) -> int:
-        """Return the exit code of the program, which has ended; 1 when the server was killed."""
+        """Return the exit code of the ended program; 1 if the server was killed."""
         code = self._server.request({'pid': self.pid})
         return 1 if code is None else code
 
 
 class ForkServer:
-    """The supervisor's end: starts the server, and asks it for processes.
+    """Client of the fork server in the supervisor: starts the server, and requests processes.
 
     Use it as a context manager around :func:`.supervise`.
     """
 
     def __init__(self, programs: Iterable[Executable]) -> None:
-        """Begin to import programs that will be started; others are forked, too."""
+        """Start the server, which imports these programs; it can fork others, too."""
         self._link, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._link.settimeout(ANSWER_TIMEOUT)
         code = f'import sys; del sys.path[0]; from {__name__} import main; main()'
@@ -81,15 +81,15 @@ class ForkServer:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Process id of the server."""
         return self._process.pid
 
     def __enter__(self) -> Self:
-        """Nothing more: it imports already."""
+        """Return itself; the server is already importing."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the server, whatever it imports; programs that run go on."""
+        """End the server, even during imports; running programs continue."""
         self._link.close()
         self._process.kill()
         self._process.wait()
@@ -97,7 +97,7 @@ class ForkServer:
     def start(
         self, argv: Sequence[str], environment: Mapping[str, str], output: int
     ) -> Forked | None:
-        """Start a program; None where it has to be executed."""
+        """Start a program; return None if it must be executed instead."""
         niceness, program = (int(argv[2]), argv[3:]) if (*argv[:2],) == _NICE else (0, argv)
         try:
             with Path(program[0]).open('rb') as file:
@@ -111,7 +111,7 @@ class ForkServer:
         return None if pid is None else Forked(self, pid)
 
     def request(self, message: Mapping[str, Any], *descriptors: int) -> int | None:
-        """Return the answer of the server; None when it does not answer."""
+        """Send a request; return the answer of the server, None without one."""
         try:
             socket.send_fds(self._link, [json.dumps(message).encode()], descriptors)
             return int(self._link.recv(_MESSAGE))
@@ -121,9 +121,9 @@ class ForkServer:
 
 
 def main() -> None:
-    """Import the programs of the command line, and fork until the supervisor goes.
+    """Import the programs of the command line, and fork them until the supervisor exits.
 
-    A program is forked as soon as it is imported. In the fork this runs it, and returns.
+    A program is forked as soon as it is imported; the fork runs it in here, then returns.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
     link = socket.socket(fileno=os.dup(sys.stdin.fileno()))
@@ -169,7 +169,7 @@ def _run(file: str) -> None:
 
 
 def _become(request: Mapping[str, Any], output: int) -> None:
-    """Give this process what an executed one has."""
+    """Set up this fork like an executed process."""
     os.setsid()
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(output, 1)

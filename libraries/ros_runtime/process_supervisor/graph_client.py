@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A blocking ROS client for programs that call running nodes step by step.
 
-This module is not imported by the package: it loads rclpy, which a mere bring-up does not need.
+The package does not import this module: it loads rclpy, which a plain bring-up does not need.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ SPIN = 0.05  # longest time in [s] after which a wait looks whether it shall be 
 
 
 class GraphClient:
-    """A node of its own, in a context of its own; use it in one thread."""
+    """A client with its own node and context; use it in one thread."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
-        """Join the ROS graph; ``given_up`` returns True when no wait shall go on."""
+        """Join the ROS graph; ``given_up`` returns True to end every wait."""
         self._given_up = given_up
         self._known = set[str]()  # services of which the nodes know this one's clients
         self._context = Context()
@@ -44,17 +44,17 @@ class GraphClient:
         self._context.try_shutdown()
 
     def listen(self, duration: float) -> None:
-        """Process what comes in, for a duration in [s]."""
+        """Spin for a duration in [s]."""
         end = time.monotonic() + duration
         while (left := end - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for a condition, which is checked after whatever comes in; times in [s].
+        """Wait for a condition, checked after each callback; times in [s].
 
         Raises:
-            CallError: It did not come in time.
-            GivenUpError: It is no longer wanted.
+            CallError: The condition was not met in time.
+            GivenUpError: ``given_up`` returned True.
         """
         end = time.monotonic() + timeout
         while not condition():
@@ -65,7 +65,7 @@ class GraphClient:
             self._executor.spin_once(timeout_sec=SPIN)
 
     def wait_until_known(self, services: Collection[str], timeout: float) -> None:
-        """Wait as :meth:`wait_until` for nodes of services to know the clients of this one."""
+        """Wait, as :meth:`wait_until`, until servers of services have found our clients."""
         if unknown := set(services) - self._known:
             match = ServerMatch(self.node, unknown)
             self.wait_until(match.advance, timeout, f'the nodes of {", ".join(sorted(unknown))}')

@@ -44,11 +44,10 @@ class _Member:
 
 
 class StopSequence:
-    """Stops the processes of one order after those of the order before.
+    """Stops processes in ascending ``order``: one group after the other.
 
-    It gets what happened (:meth:`exited`) and what time it is (:meth:`advance`), and sends
-    signals, each to the process of a name, through the callable it was given. ``now`` is steady
-    time in [s].
+    :meth:`exited` reports events, :meth:`advance` the time; the callable ``send`` sends a signal
+    to the named process. ``now`` is steady time in [s].
     """
 
     def __init__(self, send: Callable[[str, Signals], None]) -> None:
@@ -59,17 +58,17 @@ class StopSequence:
         self.abandoned: list[str] = []  # names of those that did not even end by their last one
 
     def add(self, name: str, order: int, steps: Iterable[tuple[Signals, float]]) -> None:
-        """Add a running process, and the signals with the time in [s] that each is given."""
+        """Add a running process with its signals, and the time in [s] to wait after each."""
         self._members[name] = _Member(order, tuple(steps))
 
     @property
     def finished(self) -> bool:
-        """No process is left."""
+        """Whether no process is left."""
         return not self._members
 
     @property
     def current(self) -> list[str]:
-        """Names of the processes whose turn it is."""
+        """Names of the processes that are being stopped."""
         lowest = min((member.order for member in self._members.values()), default=0)
         return [name for name, member in self._members.items() if member.order == lowest]
 
@@ -78,7 +77,7 @@ class StopSequence:
         self._members.pop(name, None)
 
     def advance(self, now: float) -> None:
-        """Send what is due: the first signal to those whose turn it is, the next to the slow."""
+        """Send the signals that are due: the first to the current group, the next to late ones."""
         while turn := self.current:
             for name in turn:
                 self._advance_member(name, now)
@@ -117,7 +116,7 @@ class StopSequence:
 
 
 class Guardian:
-    """What the guardian knows: the processes, by name, and how to stop them."""
+    """State of the guardian: the processes by name, and how to stop them."""
 
     def __init__(self) -> None:
         self._pidfds: dict[str, int] = {}
@@ -153,7 +152,7 @@ class Guardian:
             os.killpg(self._pids[name], number)
 
     def stop_all(self) -> None:
-        """Stop all processes in order; return when they have ended."""
+        """Stop all processes in order; return when all have ended."""
         while not self._sequence.finished:
             self._sequence.advance(time.monotonic())
             self._wait()
@@ -181,7 +180,7 @@ def main() -> None:
 
 
 class GuardianLink:
-    """The supervisor's end: starts the guardian and sends it what runs."""
+    """Client in the supervisor: starts the guardian and reports processes to it."""
 
     def __init__(self) -> None:
         package = Path(__file__).resolve().parent
@@ -216,7 +215,7 @@ class GuardianLink:
         self._send(gone=name)
 
     def dismiss(self) -> None:
-        """Everything has ended: the guardian may go."""
+        """End the guardian, after all processes have ended."""
         self._send(bye=True)
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):

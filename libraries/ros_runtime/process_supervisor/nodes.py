@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""ROS nodes as processes of a bring-up: executables, parameters, and what each robot starts.
+"""ROS nodes as processes of a bring-up: executables, parameters, shared nodes.
 
 A bring-up holds its bus or port exclusively.
 """
@@ -29,8 +29,8 @@ DOMAIN_MAX = 232  # highest ROS domain whose UDP ports exist
 
 ANY_NODE = '/**'
 EVERY_NODE = f'{ANY_NODE}{ANY_NODE}'
-"""All nodes, in files of our own. rcl keeps one entry per spelling, and a later entry counts more:
-what a person sets by -p or for /**, which is the same, comes behind ours in this way."""
+"""All nodes, in our own files. rcl keeps one entry per spelling, and later entries override
+earlier ones: thus the user's -p or /**, which are the same, override ours."""
 VALUES = 'ros__parameters'
 YAML_TAG = 'tag:yaml.org,2002:'
 
@@ -68,9 +68,9 @@ def node_argv(
 
     Args:
         values: ROS parameters as the command line takes them.
-        parameters: ROS parameter files, of this program's own or of
-            :func:`namespaced_parameters`; a later one counts more.
-        ros: Options of all nodes; what a person sets there counts most.
+        parameters: ROS parameter files, this program's own or from :func:`namespaced_parameters`;
+            later files override earlier ones.
+        ros: Options of all nodes; values set there override all others.
 
     Raises:
         StartError: The executable is missing; the message has the remedy.
@@ -92,7 +92,7 @@ def node_argv(
 
 
 def write_parameters(file: Path, urdf: str) -> None:
-    """Write a ROS parameter file with the description of the robot, for every node."""
+    """Write a ROS parameter file that gives every node the robot description."""
     # a JSON string is a YAML string, whatever characters are in it
     file.write_text(
         f'{EVERY_NODE}:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n'
@@ -100,7 +100,7 @@ def write_parameters(file: Path, urdf: str) -> None:
 
 
 def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
-    """Make a parameter file reach its nodes in a namespace, and count less than a person."""
+    """Adapt a parameter file to a namespace; the user's own settings override it."""
     import yaml
 
     moved: dict[str, object] = {}
@@ -115,10 +115,10 @@ def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
 
 
 def parameters_by_node(file: Path) -> dict[str, Any]:
-    """Read a parameter file by the own names of its nodes, whatever namespaces it names.
+    """Read a parameter file by node name, ignoring namespaces.
 
     Returns:
-        The parameters of each node below ``ros__parameters``; what is for all nodes as ``/**``.
+        The ``ros__parameters`` of each node; those for all nodes under ``/**``.
 
     Raises:
         StartError: It is no parameter file.
@@ -142,7 +142,7 @@ def _read_parameters(file: Path, read: Callable[[str], Any]) -> list[tuple[str, 
 
 
 def _verbatim(text: str) -> Any:  # noqa: ANN401  # whatever stands in a file
-    """Read mappings, and leave values as they stand: rcl reads 1e-3 and 1:30 otherwise."""
+    """Read mappings, but keep values as text: rcl parses 1e-3 and 1:30 differently."""
     import yaml
 
     def tree(node: yaml.Node | None) -> Any:  # noqa: ANN401
@@ -174,7 +174,7 @@ def _nodes_of(table: Mapping[str, Any], within: str = '') -> Iterator[tuple[str,
 
 
 def _merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return both, the second one's where they differ."""
+    """Merge two mappings; the second one overrides the first."""
     both = dict(base)
     for key, value in more.items():
         nested = isinstance(value, dict) and isinstance(both.get(key), dict)
@@ -183,10 +183,10 @@ def _merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def ros_domain(environment: Mapping[str, str]) -> str:
-    """Return the ROS domain that all processes will be in.
+    """Return the ROS domain of all processes.
 
     Raises:
-        StartError: ROS_DOMAIN_ID is no domain; every process would fail with its own words.
+        StartError: ROS_DOMAIN_ID is no domain; each process would fail with a different message.
     """
     domain = environment.get('ROS_DOMAIN_ID') or '0'
     if not domain.isdecimal() or int(domain) > DOMAIN_MAX:
@@ -203,21 +203,20 @@ STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher', notifies_ready=False),
     Executable('robot_viewer', 'robot_state_publisher'),
 )
-"""The public one where ROS has it, else ours."""
+"""The standard one if ROS has it, else ours."""
 TF_RATE = 100.0
-"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
+"""Maximum rate of /tf in [Hz]; the default of 20 would halve the rate of /joint_states."""
 VIEWER = Executable('robot_viewer', 'web_viewer')
-"""Serves the page, and says its URL when it is ready."""
+"""Serves the page, and reports its URL when it is ready."""
 NO_VIEW = 'NO_VIEW'  # variable that leaves the page out, where it is neither empty nor 0
 VIEWER_NICENESS = ('nice', '-n', '5')
-"""Whatever moves the robot comes first, from the start of the program on."""
+"""Programs that move the robot have priority, from the start on."""
 VIEWER_STOP_STEPS = (
     StopStep(Signals.SIGTERM, 10.0),
     StopStep(Signals.SIGABRT, 1.0),
     StopStep(Signals.SIGKILL, 1.0),
 )
-"""The viewer holds nothing that would have to be put down. On a busy computer Python takes
-seconds to end."""
+"""The viewer holds no resource to release. On a busy computer Python takes seconds to end."""
 
 
 @contextlib.contextmanager
@@ -250,7 +249,7 @@ def _abstract_name(thing: str) -> bytes:
 
 
 def _process_of(name: bytes) -> str:
-    """Return whose socket it is; nothing when it has just been closed."""
+    """Return the process that holds a socket; empty if it has just been closed."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.setblocking(False)
         try:
@@ -314,9 +313,9 @@ def node_process(
 def state_publisher(
     parameters: Path, find: FindExecutable, ros: RosOptions, *, ready_timeout: float, order: int
 ) -> ProcessSpec | None:
-    """Return the process, without which the bring-up goes on when it ends.
+    """Return the process of the state publisher; the bring-up continues if it ends.
 
-    None where neither program is installed.
+    None if neither program is installed.
     """
     installed = (each for each in STATE_PUBLISHERS if find(each.package, each.name) is not None)
     executable = next(installed, None)
@@ -349,9 +348,9 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 def view_process(
     find: FindExecutable, ros: RosOptions, *, ready_timeout: float, stop_order: int
 ) -> ProcessSpec | None:
-    """Return the process that serves the page, without which the bring-up goes on.
+    """Return the process that serves the web page; the bring-up continues if it ends.
 
-    None where it is not built.
+    None if it is not built.
     """
     if find(VIEWER.package, VIEWER.name) is None:
         return None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments that all bring-ups share: time-out, network, namespace, and those of ROS."""
+"""Arguments that all bring-ups share: time-out, network, namespace, ROS arguments."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .spec import StartError
 
 
 def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]:
-    """Return a type of argparse: a time of at least so many [s], 0 for anything above.
+    """Return an argparse type for a time of at least ``least`` in [s]; 0 allows any above 0.
 
-    ``inf``, which waits without limit, is refused where it has to be finite.
+    ``inf`` means no limit; it is rejected if the time must be ``finite``.
     """
 
     def read(text: str) -> float:
@@ -59,7 +59,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
 
 
 def apply_network(arguments: argparse.Namespace) -> None:
-    """Keep DDS of this process and those that it starts to what a person opened; print it.
+    """Restrict DDS of this process and its children to the user's choice, and print it.
 
     Raises:
         StartError: There is no such interface or peer.
@@ -88,12 +88,12 @@ class RosOptions:
 
     @property
     def frame_prefix(self) -> str:
-        """What stands before the names of TF frames, so that two robots share /tf."""
+        """Prefix of TF frame names, so that two robots can share /tf."""
         return f'{self.namespace}/' if self.namespace else ''
 
     @property
     def frame_parameters(self) -> dict[str, str]:
-        """The parameter with that prefix, for the nodes that have it; empty without a prefix."""
+        """The parameter with that prefix, for nodes that declare it; empty without a prefix."""
         return {'frame_prefix': self.frame_prefix} if self.frame_prefix else {}
 
     @property
@@ -101,7 +101,8 @@ class RosOptions:
         """Return the arguments of a node that follow its ``--ros-args``.
 
         Raises:
-            StartError: ``-p NODE:NAME:=VALUE`` in a namespace, where rcl finds no node by it.
+            StartError: ``-p NODE:NAME:=VALUE`` is used in a namespace, where rcl finds no such
+                node.
         """
         words = ['-r', f'__ns:=/{self.namespace}'] if self.namespace else []
         for option, value in _pairs(self.arguments):
@@ -117,20 +118,20 @@ class RosOptions:
         return f' --ros-args -r __ns:=/{self.namespace}' if self.namespace else ''
 
     def resolve(self, name: str) -> str:
-        """Return the full name of a relative one."""
+        """Return the fully qualified name of a relative name."""
         return f'/{self.frame_prefix}{name}'
 
     def node_name(self, name: str) -> str:
-        """Return the full name of a node that a file or an argument names for parameters.
+        """Return the fully qualified name of a node in a parameter file or argument.
 
-        A name with the namespace has it already, and a pattern is one of full names.
+        A name that includes the namespace stays, as does a pattern, which is for full names.
         """
         full = f'/{name.strip("/")}'
         inside = full.startswith(('/*', f'/{self.namespace}/'))
         return full if inside or not self.namespace else self.resolve(full[1:])
 
     def _in_root(self, node: str, value: str) -> str:
-        """Return the name of a node as rcl takes it in ``-p``: without slashes."""
+        """Return the name of a node as ``-p`` of rcl requires it: without slashes."""
         full = self.node_name(node)
         if '/' in full[1:] or '*' in full:
             raise StartError(
@@ -159,7 +160,7 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
 def parse_with_ros(
     parser: argparse.ArgumentParser, argv: Sequence[str]
 ) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse a command line that may have ROS arguments, which are options of the nodes."""
+    """Parse a command line; ROS arguments in it become options of the nodes."""
     own, ros = split_ros_arguments(argv)
     arguments = parser.parse_args(own)
     try:
@@ -169,7 +170,7 @@ def parse_with_ros(
 
 
 def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return a program's own words, and those between ``--ros-args`` and ``--``."""
+    """Return a program's own arguments, and those between ``--ros-args`` and ``--``."""
     own: list[str] = []
     ros: list[str] = []
     current = own

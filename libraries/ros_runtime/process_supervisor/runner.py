@@ -24,22 +24,22 @@ from .spec import ProcessSpec, ReadinessSocket, StartError, TRACES, VARIABLE
 from .supervision import Notice, Outcome, Phase, Supervision
 
 LONGEST_LINE = 16384
-"""Bytes after which a line is cut: a process that never ends a line must not eat the memory."""
+"""Maximum length of a line in [byte]; longer ones are cut, to limit memory."""
 
 CHUNK = 65536  # bytes read from a pipe at once
 LAST_CHUNKS = 64
-"""How often a pipe is read after its process has ended; what it left behind may go on."""
+"""Maximum reads of a pipe after its process has ended: its children may keep writing."""
 LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # signals that end the supervisor
 
 
 class LineSplitter:
-    """Collects bytes and returns whole lines."""
+    """Splits a byte stream into complete lines."""
 
     def __init__(self) -> None:
         self._rest = b''
 
     def feed(self, data: bytes) -> list[str]:
-        """Split bytes into lines; they may end anywhere, also inside a character."""
+        """Add bytes and return the completed lines; a chunk may end inside a character."""
         *lines, rest = (self._rest + data).split(b'\n')
         while len(rest) > LONGEST_LINE:
             lines.append(rest[:LONGEST_LINE])
@@ -48,7 +48,7 @@ class LineSplitter:
         return [_decode(line) for line in lines]
 
     def flush(self) -> list[str]:
-        """Return what is left when the pipe has ended: a line without an end, or nothing."""
+        """Return the rest when the pipe has ended: an unterminated line, or nothing."""
         rest, self._rest = self._rest, b''
         return [_decode(rest)] if rest else []
 
@@ -94,7 +94,7 @@ class _Child:
             os.killpg(self.process.pid, number)
 
     def reap(self) -> int:
-        """Collect the exit code of one that has ended; what it left in its group is killed."""
+        """Collect the exit code of the ended process, and kill the rest of its group."""
         self.send(signal.SIGKILL)
         returncode = self.process.wait()
         os.close(self.pidfd)
@@ -106,9 +106,9 @@ class _Child:
 
 @final
 class Runner:
-    """Starts the processes of a bring-up and stays with them until they have ended.
+    """Starts the processes of a bring-up and supervises them until they have ended.
 
-    Use it as a context manager, run it in the main thread; :meth:`stop` may be called from any.
+    Use it as a context manager in the main thread; :meth:`stop` is thread-safe.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class Runner:
         on_phase: Callable[[Phase], None] = lambda _: None,
         fork_server: ForkServer | None = None,
     ) -> None:
-        """Plan the run; nothing is started yet. ``write`` gets a process and each line of it."""
+        """Plan the run; nothing is started yet. ``write`` gets each line with its process name."""
         self._fork_server = fork_server
         self._write = write
         self._children: dict[str, _Child] = {}
@@ -135,7 +135,7 @@ class Runner:
         self._restore: list[Callable[[], object]] = []
 
     def __enter__(self) -> Runner:
-        """Start the guardian and listen to signals."""
+        """Start the guardian and install signal handlers."""
         for end in (self._wake_read, self._wake_write):
             end.setblocking(False)
         self._selector.register(self._wake_read, selectors.EVENT_READ, self._wake)
@@ -150,7 +150,7 @@ class Runner:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop what still runs, and give back signals and handles."""
+        """Stop running processes, and restore signal handlers and close handles."""
         self._supervision.stop(Outcome(1, f'{error}'), time.monotonic())
         self._loop()
         for restore in reversed(self._restore):
@@ -172,17 +172,17 @@ class Runner:
 
     @property
     def phase(self) -> Phase:
-        """What the supervision is doing."""
+        """Current phase of the supervision."""
         return self._supervision.phase
 
     def run(self) -> Outcome:
-        """Start everything, and return when everything has ended."""
+        """Start all processes; return when all have ended."""
         self._supervision.begin(time.monotonic())
         self._loop()
         return self._supervision.outcome or Outcome(0, 'nothing was to be run')
 
     def stop(self, outcome: Outcome) -> None:
-        """Request an orderly end, from any thread; after it, nothing happens."""
+        """Request an orderly stop; thread-safe, no effect after the end."""
         self._requests.put(outcome)
         with contextlib.suppress(OSError):  # full of wake-ups: it will wake up; or it has ended
             self._wake_write.send(b'\0')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Processes of a bring-up: how each is started, reports that it is ready, and is stopped.
+"""Processes of a bring-up: how each is started, reports readiness, and is stopped.
 
 The errors of the package are here, too::
 
@@ -33,7 +33,7 @@ class StartError(SupervisorError, OSError):
 
 
 class CallError(SupervisorError):
-    """What runs refused something, did not answer in time, or is in a fault.
+    """A running process refused a request, did not answer in time, or is in a fault.
 
     Scenarios: a drive that does not enable, a mode that is not accepted, a robot that has
     fallen, a service that is not there.
@@ -41,7 +41,7 @@ class CallError(SupervisorError):
 
 
 def no_answer(what: str, waited: float) -> CallError:
-    """Return the error for something that did not come in time, in [s]."""
+    """Return the error for a missing answer after a time in [s]."""
     return CallError(
         f'waited {round(waited, 1):g} s in vain for {what}; is this machine too busy? '
         'If not, the log above says why'
@@ -49,7 +49,7 @@ def no_answer(what: str, waited: float) -> CallError:
 
 
 class GivenUpError(SupervisorError):
-    """What is waited for is no longer wanted.
+    """A wait was given up.
 
     Scenarios: Ctrl-C, a process of the bring-up has ended.
     """
@@ -57,14 +57,14 @@ class GivenUpError(SupervisorError):
 
 VARIABLE = 'NOTIFY_SOCKET'  # names the socket in the environment of the process
 TRACES = 'PYTHONFAULTHANDLER'
-"""Variable by which Python prints what its threads are doing when it crashes, or gets SIGABRT."""
+"""Variable that makes Python print its threads' stacks at a crash or SIGABRT."""
 _READY = b'READY=1'
 _STATUS = b'STATUS='
 _MAX_MESSAGE = 4096
 
 
 class ReadinessSocket:
-    """Receives what one process reports; others of systemd's messages are passed over."""
+    """Receives the readiness of one process; ignores other messages of systemd's protocol."""
 
     def __init__(self) -> None:
         """Open it."""
@@ -74,7 +74,7 @@ class ReadinessSocket:
 
     @property
     def address(self) -> str:
-        """What the variable names."""
+        """Value of the environment variable that names the socket."""
         name: bytes = self._socket.getsockname()
         return f'@{name[1:].decode()}'
 
@@ -83,7 +83,7 @@ class ReadinessSocket:
         return self._socket.fileno()
 
     def is_ready(self) -> bool:
-        """Receive what has come; true when readiness was in it."""
+        """Receive pending messages; return True if one reports readiness."""
         ready = False
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -95,15 +95,15 @@ class ReadinessSocket:
         return ready
 
     def close(self) -> None:
-        """Close the socket; what the process reports from now on is lost."""
+        """Close the socket; later reports of the process are lost."""
         self._socket.close()
 
 
 class ServiceManager:
-    """What started this process and waits for its readiness: systemd for ``Type=notify``."""
+    """Parent that waits for readiness of this process, such as systemd (``Type=notify``)."""
 
     def __init__(self) -> None:
-        """Find it; the processes that this one starts will not."""
+        """Find the service manager, and hide it from child processes."""
         address = os.environ.pop(VARIABLE, '')
         self._address = f'\0{address[1:]}' if address.startswith('@') else address
         self._reported = ''
@@ -133,10 +133,10 @@ STOP_STEPS = (
     StopStep(Signals.SIGABRT, 2.0),
     StopStep(Signals.SIGKILL, 2.0),
 )
-"""The usual ladder; 20 s because a master may take 18 s to bring its drives to rest.
+"""Default escalation; 20 s because a master may take 18 s to bring its drives to rest.
 
-No SIGINT: by it, a Python process that is still importing ends with a traceback. By SIGABRT, one
-that hangs prints what each of its threads is doing.
+No SIGINT: it ends a Python process that is still importing with a traceback. SIGABRT makes a
+hanging process print the stacks of its threads.
 """
 
 
@@ -159,10 +159,10 @@ class ProcessSpec:
     stop_steps: tuple[StopStep, ...] = STOP_STEPS  # how it is stopped
 
     def __post_init__(self) -> None:
-        """Refuse what would only fail later.
+        """Reject a specification that would fail only later.
 
         Raises:
-            ValueError: Empty argv or steps.
+            ValueError: ``argv`` or the stop steps are empty.
         """
         if not self.argv:
             raise ValueError(f'process {self.name}: argv is empty')

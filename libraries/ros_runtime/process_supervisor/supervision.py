@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The decisions of a supervisor: no process, no clock and no signal handler in here."""
+"""Decisions of a supervisor, without processes, clock or signal handlers."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ ECHO_TIME = 0.5
 a process and to its group."""
 
 RESTART_DELAYS = (1.0, 5.0, 30.0)
-"""Times in [s] from the end of a process that is not required to its next start: of the first
-ends one each, then the last one; from the first again when it ran for longer than the last."""
+"""Delays in [s] before restarts of an optional process, in order; the last one repeats. They begin
+anew after the process ran for longer than the last delay."""
 
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
-"""Return codes of a process that ended as it should when it was stopped."""
+"""Return codes of a process that was stopped normally."""
 
 
 class Phase(Enum):
-    """What a supervision is doing."""
+    """Phase of a supervision."""
 
     IDLE = 'idle'
     STARTING = 'starting'
@@ -81,9 +81,9 @@ class _Child:
 
 
 class Supervision:
-    """Starts processes at once, waits until all are ready, stops all when a required one ends.
+    """Starts all processes, waits until they are ready, stops all when a required one ends.
 
-    Another one that ends after it was ready is started again. ``now`` is steady time in [s].
+    An optional process that ends after it was ready is restarted. ``now`` is steady time in [s].
     """
 
     def __init__(
@@ -100,11 +100,11 @@ class Supervision:
 
         Args:
             specs: The processes, started in this order.
-            start: Starts one; raises :class:`.StartError` when that is not possible.
-            send: Sends a signal to a running one.
+            start: Starts a process; raises :class:`.StartError` if it cannot.
+            send: Sends a signal to a running process.
             notify: Shows the user a notice.
-            on_interrupt: Called at the first interrupt before everything is stopped; true when it
-                takes care of stopping, false or None to stop at once.
+            on_interrupt: Called at the first interrupt; returns True if it stops the processes
+                itself, False or None to stop them at once.
             on_phase: Called when another phase begins.
 
         Raises:
@@ -131,16 +131,16 @@ class Supervision:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Names of the processes that run."""
+        """Names of the running processes."""
         return tuple(name for name, child in self._children.items() if child.running)
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """Names of the processes that are waited for."""
+        """Names of the processes that are not ready yet."""
         return tuple(name for name in self._late_ones() if self._children[name].spec.awaited)
 
     def begin(self, now: float) -> None:
-        """Start everything."""
+        """Start all processes."""
         self._enter(Phase.STARTING)
         self._begun = now
         for name, child in self._children.items():
@@ -150,7 +150,7 @@ class Supervision:
         self._check_ready(now)
 
     def _run(self, child: _Child, now: float) -> str:
-        """Start a process; return why that is not possible, empty when it runs."""
+        """Start a process; return why it failed, empty if it runs."""
         child.deadline, child.restart = now + child.spec.ready_timeout, math.inf
         try:
             self._start(child.spec)
@@ -165,7 +165,7 @@ class Supervision:
         self._children[name].lines.append(text)
 
     def ready(self, name: str, now: float, status: str = '') -> None:
-        """Process that a process is ready."""
+        """Handle the readiness of a process."""
         child = self._children[name]
         if child.reported:
             return
@@ -182,7 +182,7 @@ class Supervision:
             self._say(f'all is ready ({now - self._begun:.1f} s)')
 
     def exited(self, name: str, returncode: int, now: float) -> None:
-        """Process the end of a process; a negative code is the signal that killed it."""
+        """Handle the end of a process; a negative code is the signal that killed it."""
         child = self._children[name]
         child.running = False
         how = describe_exit(returncode)
@@ -215,7 +215,7 @@ class Supervision:
         self._notify(Notice(Severity.WARNING, text, child.spec.name))
 
     def interrupt(self, now: float) -> None:
-        """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once."""
+        """Handle Ctrl-C: stop in order; a second one after :data:`ECHO_TIME` kills at once."""
         if 0.0 <= now - self._interrupted < ECHO_TIME:
             return
         self._interrupted = now
@@ -240,7 +240,7 @@ class Supervision:
         self._advance_stop(now)
 
     def advance(self, now: float) -> None:
-        """Do what is due."""
+        """Perform the actions that are due."""
         if self.phase in {Phase.STARTING, Phase.RUNNING}:
             for child in self._children.values():
                 if now >= child.restart and (why := self._run(child, now)):

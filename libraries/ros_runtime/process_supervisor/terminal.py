@@ -25,20 +25,20 @@ ENDING_TIMEOUT = 10.0  # time in [s] in which a thread that was asked to has to 
 
 USAGE_ERROR = 2  # exit code of a bring-up when nothing was started
 REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
-"""What is reported to the service manager of a bring-up, as in sd_notify(3)."""
+"""States reported to the service manager of a bring-up, as in sd_notify(3)."""
 Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]
-"""Done at the first Ctrl-C, while all processes still run; everything is stopped when it returns.
+"""Called at the first Ctrl-C, while all processes still run; they are stopped when it returns.
 
-It gets a function that shows the user a message, and one that returns True when it is no longer
-wanted: Ctrl-C again, or a process has ended.
+It gets a function that shows the user a message, and one that returns True when it must give up: a
+second Ctrl-C, or a process has ended.
 """
 
 
 def join_in_time(thread: threading.Thread) -> str:
-    """Wait for a daemon thread that was asked to end; the program ends without it else.
+    """Wait for a daemon thread to end; after a time-out, let the program exit without it.
 
     Returns:
-        Why it is given up, with what all threads are doing; empty when it has ended.
+        Why the wait was given up, with the stacks of all threads; empty if it has ended.
     """
     thread.join(ENDING_TIMEOUT)
     if not thread.is_alive():
@@ -54,7 +54,7 @@ def join_in_time(thread: threading.Thread) -> str:
 def leave() -> None:
     """End the program with exit code 1, without finalising the interpreter.
 
-    A thread that comes back from C++ into an interpreter that is being taken down aborts it.
+    A thread that returns from C++ during finalisation would abort the interpreter.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -70,10 +70,9 @@ def supervise(
 ) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
-    That all are ready, and that all are stopped, is reported to systemd, or what else
-    ``NOTIFY_SOCKET`` names, as in sd_notify(3). ``shutdown`` is done in a thread before they are
-    stopped, if all had got ready. ``on_phase`` is called when a phase begins; ``fork_server``
-    starts what it can.
+    It reports readiness and stopping to systemd, or to another ``NOTIFY_SOCKET``, as in
+    sd_notify(3). ``shutdown`` runs in a thread before the stop, if all were ready. ``on_phase`` is
+    called when a phase begins; ``fork_server`` starts the programs it can.
     """
     names = [spec.name for spec in processes]
     painter = Painter('bringup', names, wants_colour(sys.stdout, os.environ))
@@ -127,7 +126,7 @@ def supervise(
 
 
 def explain(outcome: Outcome) -> str:
-    """Return why a bring-up failed, with what the process wrote last."""
+    """Return why a bring-up failed, with the last output of the process."""
     if not outcome.last_lines:
         return outcome.reason
     quoted = '\n'.join(f'    {line}' for line in outcome.last_lines)
@@ -148,11 +147,11 @@ ROS_SEVERITY = re.compile(r'^\[(DEBUG|INFO|WARN|ERROR|FATAL)\]')
 """Severity at the start of a line of rcutils logging, in the format that the bring-up sets."""
 
 LOUD_SEVERITIES = {'WARN': Severity.WARNING, 'ERROR': Severity.ERROR, 'FATAL': Severity.ERROR}
-"""How loud the severities of rcutils are here; the others are information."""
+"""Severities of rcutils as ours; all others are INFO."""
 
 
 def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
-    """Return whether a stream is coloured; NO_COLOR (https://no-color.org) and TERM count."""
+    """Return whether to colour a stream, by NO_COLOR (https://no-color.org) and TERM."""
     smart = environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
     return stream.isatty() and not environment.get('NO_COLOR') and smart
 
@@ -160,8 +159,7 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
 def severity_of(line: str) -> Severity:
     """Return the severity of an output line of a ROS node.
 
-    One that is no log line, such as that of a traceback, is a warning: nothing of the kind is
-    expected.
+    Any other line, such as that of a traceback, is a warning, as it is unexpected.
     """
     match = ROS_SEVERITY.match(line)
     return LOUD_SEVERITIES.get(match[1], Severity.INFO) if match else Severity.WARNING
@@ -169,7 +167,7 @@ def severity_of(line: str) -> Severity:
 
 @dataclass(frozen=True, slots=True)
 class Painter:
-    """Puts names in front of lines, all as wide as the widest."""
+    """Prefixes lines with process names, padded to the widest."""
 
     own: str  # name of the supervising program
     names: Sequence[str]  # names of its processes
@@ -198,7 +196,7 @@ class Painter:
 
 
 class LineWriter:
-    """Writes lines at once; goes on silently when their reader is gone."""
+    """Writes and flushes lines; continues silently if the reader is gone."""
 
     def __init__(self, stream: TextIO) -> None:
         """Write to a stream."""

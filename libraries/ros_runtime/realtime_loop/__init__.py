@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Deadlines without bursts, priority and locked memory for threads that own a cycle."""
+"""Cycle timing without bursts, real-time priority and locked memory for cyclic threads."""
 
 from .privileges import (
     Cycle,

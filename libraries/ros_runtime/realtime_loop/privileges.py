@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Deadlines of a cycle; real-time priority, locked memory and a frozen garbage collector for it.
+"""Timing of a cycle, with real-time priority, locked memory and a frozen garbage collector.
 
-A process does without what is refused; the outcome is one line with what that means and how to
-get it.
+A process runs on without a refused privilege; the outcome is one line with the consequence and the
+remedy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 
 class Cycle(NamedTuple):
-    """A cycle that begins."""
+    """Timing of one cycle."""
 
     time: float  # its time on the grid
     late: float  # how long after its deadline it begins
@@ -25,10 +25,10 @@ class Cycle(NamedTuple):
 
 
 class CycleTimer:
-    """When the next cycle is due; after a stall cycles are skipped, and never made up for.
+    """Computes when the next cycle is due; cycles missed in a stall are skipped, not repeated.
 
-    So each cycle has a place of its own on the grid, and what is commanded in a cycle lasts for a
-    period: a motion is late after a stall, but not faster.
+    So each cycle starts on the time grid, and its command lasts for a period: after a stall, a
+    motion is late but not faster.
     """
 
     def __init__(self, period: float, now: float) -> None:
@@ -43,7 +43,7 @@ class CycleTimer:
         self.deadline = now  # when the next one is due
 
     def begin(self, now: float) -> Cycle:
-        """Begin the cycle that is due; the next deadline is the first on the grid after now."""
+        """Begin the due cycle; the next deadline is the first grid point after ``now``."""
         late = max(0.0, now - self.deadline)
         skipped = int(late / self.period)
         time = self.deadline + skipped * self.period
@@ -70,7 +70,7 @@ class Outcome(NamedTuple):
 
 
 def raise_priority(priority: int, what: str) -> Outcome:
-    """Raise the calling thread to a real-time priority, which its threads do not inherit."""
+    """Raise the calling thread to a real-time priority; new threads do not inherit it."""
     if not priority:
         return Outcome(granted=False, text='')
     try:
@@ -86,9 +86,9 @@ def raise_priority(priority: int, what: str) -> Outcome:
 
 
 def settle_memory() -> Outcome:
-    """Keep garbage collector and swap from what this process has now; call it before the cycle.
+    """Exclude current objects from garbage collection and lock memory; call before the cycle.
 
-    Pages are locked as soon as they are used, so that the process does not grow by it.
+    Pages are locked on first use, so the process does not grow.
 
     Returns:
         Whether the memory is locked.
@@ -106,9 +106,9 @@ def settle_memory() -> Outcome:
 
 
 def unsettle_memory() -> None:
-    """Return to the garbage collector what :func:`settle_memory` kept from it; for the end.
+    """Undo the freeze of :func:`settle_memory`; call it at the end of the program.
 
-    Libraries list on standard error what is still there when the interpreter ends.
+    Otherwise libraries report leaked objects on stderr when the interpreter ends.
     """
     if gc.get_freeze_count():
         gc.unfreeze()
@@ -116,7 +116,7 @@ def unsettle_memory() -> None:
 
 
 def _may_lock() -> bool:
-    """Whether locking has no limit; below one, a process that grows would end by it."""
+    """Whether locked memory is unlimited; under a limit, a growing process would fail."""
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY:
         return True
     try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person moves a robot with: keys, with their release, from any terminal; and gamepads."""
+"""Operator input for robots: keys with their releases, from any terminal, and gamepads."""
 
 from .exceptions import DeviceError, OperatorInputError, PresetError, SettingError, TerminalError
 from .keyboard import Keyboard, ReleaseSource

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Input devices of the kernel, by the package evdev.
+"""Reads input devices of the kernel by the package evdev.
 
 Codes: include/uapi/linux/input-event-codes.h.
 """
@@ -36,7 +36,7 @@ class InputEvent(NamedTuple):
 
 
 class AxisRange(NamedTuple):
-    """Range of an axis; values that are flat about the middle mean rest. In [device units]."""
+    """Range of an axis in [device units]; values within ``flat`` of the middle mean rest."""
 
     minimum: int
     maximum: int
@@ -45,7 +45,7 @@ class AxisRange(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What a device is: its file, what it calls itself, its USB or Bluetooth vendor."""
+    """Identity of a device: its file, its own name, its USB or Bluetooth vendor."""
 
     path: str
     name: str
@@ -56,7 +56,7 @@ class DeviceInfo:
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """The codes that are pressed, and where each axis is by its code [device units]."""
+    """The pressed codes, and the position of each axis by its code in [device units]."""
 
     keys: frozenset[int]
     axes: Mapping[int, int]
@@ -69,7 +69,7 @@ class InputDevice:
         """Open it.
 
         Raises:
-            DeviceError: It is gone, or may not be read, or the package evdev is missing.
+            DeviceError: The device is gone or not readable, or the package evdev is missing.
         """
         try:
             # not every installation has it, and keys work without
@@ -92,11 +92,11 @@ class InputDevice:
         )
 
     def fileno(self) -> int:
-        """Return what to wait for."""
+        """Return the file descriptor to wait for."""
         return self._device.fd
 
     def read(self) -> Iterable[InputEvent]:
-        """Return the events that have come, without waiting.
+        """Return pending events, without waiting.
 
         Raises:
             DeviceError: It was unplugged.
@@ -121,7 +121,7 @@ class InputDevice:
             raise self._gone(error) from None
 
     def close(self) -> None:
-        """Close the device; one that was unplugged is no error."""
+        """Close the device; an unplugged one is no error."""
         with contextlib.suppress(OSError):
             self._device.close()
 
@@ -130,26 +130,26 @@ class InputDevice:
 
 
 class InputDevices:
-    """All devices of this machine that this user may read."""
+    """All input devices of this machine that the user may read."""
 
     def __init__(self, folder: str = FOLDER) -> None:
         self._folder = folder
 
     def paths(self) -> list[str]:
-        """Return the files of the devices that this user may read."""
+        """Return the files of the devices that the user may read."""
         files = sorted(Path(self._folder).glob('event*'), key=_number)
         return [str(file) for file in files if os.access(file, os.R_OK)]
 
     def open(self, path: str) -> InputDevice:
-        """Open one of paths().
+        """Open a device of paths().
 
         Raises:
-            DeviceError: It is gone, or may not be read.
+            DeviceError: The device is gone or not readable.
         """
         return InputDevice(path)
 
     def problem(self) -> str:
-        """Return why nothing can be read, and what helps; empty when something can."""
+        """Return why no device is readable, and the remedy; empty if one is."""
         if importlib.util.find_spec('evdev') is None:
             return MISSING
         folder = Path(self._folder)
@@ -161,7 +161,7 @@ class InputDevices:
 
 
 class DeviceSearch:
-    """Looks for devices of a kind that are plugged in at any time. Times are in [s]."""
+    """Searches periodically for plugged-in devices of one kind. Times are in [s]."""
 
     def __init__(
         self,
@@ -170,7 +170,7 @@ class DeviceSearch:
         period: float,
         others_period: float,
     ) -> None:
-        """Scan once a period; one that does not fit is opened less often, as opening wakes it."""
+        """Scan once a period; open devices that do not fit less often, as that wakes them."""
         self._devices = devices
         self._fits = fits
         self._period = period
@@ -179,7 +179,7 @@ class DeviceSearch:
         self._next = float('-inf')
 
     def found(self, now: float, skip: Callable[[str], bool]) -> Iterator[InputDevice]:
-        """Open the devices that fit, but some paths, if it is time to look for them."""
+        """Open the devices that fit, except skipped paths, if a scan is due."""
         if now < self._next:
             return
         self._next = now + self._period

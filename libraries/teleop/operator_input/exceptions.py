@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that operator_input raises.
+"""Exceptions of operator_input.
 
 ::
 
@@ -21,16 +21,16 @@ class OperatorInputError(Exception):
 
 
 class TerminalError(OperatorInputError, OSError):
-    """Started by a service manager or with a pipe; the window was closed, or SSH broke off."""
+    """There is no terminal (service manager, pipe), or its window or SSH session has closed."""
 
 
 class DeviceError(OperatorInputError, OSError):
-    """The user is not in the group input, or the device was unplugged."""
+    """An input device cannot be read: the user is not in the group input, or it was unplugged."""
 
 
 class PresetError(OperatorInputError, ValueError):
-    """A preset is misspelt (the message lists what there is), or an expression malformed."""
+    """A preset is misspelt (the message lists all), or an expression is malformed."""
 
 
 class SettingError(OperatorInputError, ValueError):
-    """Such as a time-out for still sticks that is shorter than the one for all others."""
+    """Settings conflict, such as a shorter time-out for still sticks than for all others."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Gamepads: names that do not depend on the maker, what a person allows, what each code means.
+"""Gamepads: vendor-independent names, deadman buttons, and the meaning of each code.
 
 Sources of the presets: the kernel's Documentation/input/gamepad.rst; its drivers xpad (whose X
 is BTN_NORTH and Y is BTN_WEST, against the specification), hid-playstation and hid-sony; for pads
@@ -50,7 +50,7 @@ class Axis(Enum):
 
     @property
     def is_trigger(self) -> bool:
-        """Whether it rests at its end, not in its middle."""
+        """Whether the axis rests at its end, not in its middle."""
         return self in {Axis.LEFT_TRIGGER, Axis.RIGHT_TRIGGER}
 
 
@@ -83,7 +83,7 @@ TRIGGERS = {
 
 @dataclass(frozen=True, slots=True)
 class GamepadState:
-    """Where everything is at one moment."""
+    """State of all axes and buttons at one moment."""
 
     # positions from -1 to 1, triggers from 0; an axis that is not there is not in it
     axes: Mapping[Axis, float] = field(default_factory=dict)
@@ -93,11 +93,11 @@ class GamepadState:
     changes: int = field(default=0, compare=False)
 
     def axis(self, axis: Axis) -> float:
-        """Return the position of an axis; 0 if the gamepad has none such."""
+        """Return the position of an axis; 0 if the gamepad does not have it."""
         return self.axes.get(axis, 0.0)
 
     def is_pressed(self, button: Button) -> bool:
-        """Return whether a button is pressed; a trigger is, too, beyond the middle of its axis."""
+        """Return whether a button is pressed; a trigger is when beyond the middle of its axis."""
         trigger = TRIGGERS.get(button)
         return button in self.buttons or (
             trigger is not None and self.axis(trigger) > TRIGGER_PRESSED
@@ -105,9 +105,9 @@ class GamepadState:
 
     @property
     def at_full_deflection(self) -> bool:
-        """Whether every stick and trigger that is deflected at all is so to its end.
+        """Whether every deflected stick and trigger is at its end.
 
-        There a living hand need not change anything; between, it trembles.
+        At the end a hand may be perfectly still; anywhere else it trembles.
         """
         ways = [
             *(math.hypot(self.axis(x), self.axis(y)) for x, y in STICKS),
@@ -126,11 +126,11 @@ DEADMAN_BUTTONS: Mapping[str, Button | None] = {
     **{button.value: button for button in Button},
     'none': None,
 }
-"""What may be chosen for a button of a deadman, by its name."""
+"""Choices for a deadman button, by name."""
 
 
 class Grip(Enum):
-    """What the person allows."""
+    """Motion that the operator permits."""
 
     RELEASED = 'released'
     HELD = 'held'
@@ -146,7 +146,7 @@ class Timeout(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Deadman:
-    """Which buttons allow motion, and for how long a pad may be without any change.
+    """Deadman buttons that permit motion, and time-outs for a gamepad without any change.
 
     Raises:
         SettingError: The second time is shorter than the first.
@@ -171,7 +171,7 @@ class Deadman:
             )
 
     def grip(self, state: GamepadState) -> Grip:
-        """Return what the person allows."""
+        """Return the motion that the operator permits."""
         if self.turbo is not None and state.is_pressed(self.turbo):
             return Grip.TURBO
         if self.enable is None or state.is_pressed(self.enable):
@@ -179,7 +179,7 @@ class Deadman:
         return Grip.RELEASED
 
     def timeout_at(self, state: GamepadState) -> Timeout:
-        """Return for how long a gamepad may report no change while it moves something."""
+        """Return how long a gamepad may report no change during a motion."""
         if state.at_full_deflection:
             return Timeout('deadman_full_deflection_timeout', self.full_deflection_timeout)
         return Timeout('deadman_timeout', self.timeout)
@@ -202,7 +202,7 @@ STANDARD_AXES = _LEFT_STICK_AND_DPAD | {
     ABS_Z: Axis.LEFT_TRIGGER,
     ABS_RZ: Axis.RIGHT_TRIGGER,
 }
-"""Axes of the kernel's specification."""
+"""Axes by the kernel's specification."""
 
 HID_AXES = _LEFT_STICK_AND_DPAD | {
     ABS_Z: Axis.RIGHT_X,
@@ -219,7 +219,7 @@ STANDARD_BUTTONS = {
     0x13A: Button.SELECT, 0x13B: Button.START, 0x13C: Button.GUIDE,
     0x13D: Button.LEFT_STICK, 0x13E: Button.RIGHT_STICK,
 }  # fmt: skip
-"""Buttons of the kernel's specification."""
+"""Buttons by the kernel's specification."""
 
 XBOX_BUTTONS = STANDARD_BUTTONS | {0x133: Button.WEST, 0x134: Button.NORTH}
 """Buttons of the driver xpad, and of pads that imitate it."""
@@ -239,7 +239,7 @@ DPAD_BUTTONS = {
     0x222: (Axis.DPAD_X, 1.0),
     0x223: (Axis.DPAD_X, -1.0),
 }
-"""Buttons of pads that have four of them for the d-pad: the axis and the side that they mean."""
+"""Axis and direction of d-pad buttons, on pads that have four buttons for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +254,7 @@ class Preset:
     axes: Mapping[int, Axis]
 
     def fits(self, info: DeviceInfo) -> bool:
-        """Return whether a device is of this kind."""
+        """Return whether the preset fits a device."""
         return info.vendor in self.vendors or self.names.search(info.name) is not None
 
 
@@ -268,7 +268,7 @@ PRESETS = (
     _preset('ps', 'playstation|dualshock|dualsense|sony', {0x054C}, STANDARD_BUTTONS),
     _preset('generic', '', set(), STANDARD_BUTTONS | HID_BUTTONS),
 )
-"""All presets, the first that fits is used."""
+"""All presets; the first that fits is used."""
 
 AUTO = 'auto'  # name that means: whichever fits the device
 
@@ -282,7 +282,7 @@ def is_gamepad(info: DeviceInfo) -> bool:
 def choose_preset(name: str, info: DeviceInfo) -> Preset:
     """Choose the preset of a device, by its name or by :data:`AUTO`.
 
-    A device that has a stick on ABS_RX is no self-describing one.
+    A device with a stick on ABS_RX does not get the preset for self-describing pads.
 
     Raises:
         PresetError: There is no preset of that name.
@@ -308,7 +308,7 @@ OTHERS_PERIOD = 10.0  # [s] for which a device that is no gamepad is not opened 
 
 
 class Gamepad(contextlib.AbstractContextManager['Gamepad']):
-    """Reads the first gamepad that fits; when it is unplugged, all is at rest.
+    """Reads the first gamepad that fits; when it is unplugged, all axes and buttons are at rest.
 
     A context manager that closes it. Times are in [s].
     """
@@ -323,19 +323,19 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
         log: Callable[[str], None] = lambda _: None,
         warn: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Start without one; the first scan() opens it.
+        """Start without a gamepad; the first scan() opens one.
 
         Args:
-            devices: Where to look; the devices of this machine when it is None.
+            devices: Where to search; None for the devices of this machine.
             preset: Name of a preset, or ``auto``.
-            device: Path of a device, or expression that its name has to match; empty for any.
-            dead_zone: Share of the way about the middle that counts as rest.
-            log: Called with a message when a gamepad comes and goes.
+            device: Path of a device, or regular expression for its name; empty for any.
+            dead_zone: Fraction of the travel around the middle that counts as rest.
+            log: Called with a message when a gamepad is connected or lost.
             warn: Called with the reason when the first scan finds none.
 
         Raises:
-            PresetError: There is no preset of that name, or the expression is none.
-            ValueError: The dead zone is no share.
+            PresetError: There is no preset of that name, or the expression is malformed.
+            ValueError: The dead zone is no fraction.
         """
         if preset != AUTO:
             _named(preset)
@@ -360,12 +360,12 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a gamepad."""
+        """Whether a gamepad is connected."""
         return self._device is not None
 
     @property
     def state(self) -> GamepadState:
-        """Where everything is; at rest without a gamepad."""
+        """Current state; at rest without a gamepad."""
         return self._reading.state() if self._reading is not None else AT_REST
 
     def scan(self, now: float) -> None:
@@ -387,7 +387,7 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
         return self.read()
 
     def read(self) -> list[GamepadState]:
-        """Read what has come, without waiting.
+        """Read pending reports, without waiting.
 
         Returns:
             The state after each report of the device, so that no short press is missed; a last one
@@ -437,12 +437,12 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
 class GamepadReading:
     """Keeps the state of one gamepad; pure.
 
-    Axes are scaled by the range that the device names; what is within the dead zone is 0, and
-    beyond it they begin at 0 again, without a jump.
+    Axes are scaled by the range that the device reports; values in the dead zone are 0, and values
+    beyond it start from 0, without a jump.
     """
 
     def __init__(self, info: DeviceInfo, preset: Preset, dead_zone: float) -> None:
-        """Start at rest; the dead zone is the share of the way that counts as rest."""
+        """Start at rest; the dead zone is the fraction of the travel that counts as rest."""
         self._preset = preset
         self._ranges = {code: info.axes[code] for code in preset.axes if code in info.axes}
         self._dead_zone = dead_zone
@@ -496,10 +496,10 @@ def position(axis: Axis, span: AxisRange, value: int, dead_zone: float) -> float
     """Scale the value of an axis.
 
     Args:
-        axis: Which; a trigger rests at its minimum, all others in the middle.
+        axis: The axis; a trigger rests at its minimum, all others in the middle.
         span: Its range, as the device reports it.
-        value: What it reports [device units].
-        dead_zone: Share of the way that counts as rest.
+        value: Reported value in [device units].
+        dead_zone: Fraction of the travel that counts as rest.
 
     Returns:
         -1 to 1, up and left positive; 0 to 1 of a trigger.

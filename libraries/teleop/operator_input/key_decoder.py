@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From the bytes of a terminal to key events and reports.
+"""Decodes the bytes of a terminal to key events and reports.
 
 Sources: ECMA-48, section 5.4; xterm's ctlseqs ("PC-Style Function Keys", "VT220-Style Function
 Keys"); the Kitty keyboard protocol: ``CSI code:shifted:base ; modifiers:event ; text u``, and for
@@ -84,16 +84,16 @@ class ReportKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """An answer of the terminal; the flags are those that are on, of KITTY_FLAGS."""
+    """An answer of the terminal; ``flags`` are the active ones of KITTY_FLAGS."""
 
     kind: ReportKind
     flags: Kitty = NO_FLAGS
 
 
 class KeyDecoder:
-    """Turns bytes into key events, of every encoding that terminals use. Times are in [s].
+    """Decodes bytes to key events, in every encoding that terminals use. Times are in [s].
 
-    Bytes may be cut anywhere. Pasted text is dropped.
+    Input may be split at any byte. Pasted text is dropped.
     """
 
     def __init__(self) -> None:
@@ -107,20 +107,20 @@ class KeyDecoder:
 
     @property
     def is_pending(self) -> bool:
-        """Whether an escape waits for what may follow; then call flush() soon."""
+        """Whether an escape byte waits for possible successors; then call flush() soon."""
         return bool(self._rest)
 
     @property
     def is_holding(self) -> bool:
-        """Whether a key is down whose release the terminal is to report."""
+        """Whether a key is down whose release the terminal will report."""
         return bool(self._down)
 
     def forget(self) -> None:
-        """Forget which keys are down, as after all of them were let go of."""
+        """Reset the keys that are down, as if all were released."""
         self._down.clear()
 
     def feed(self, data: bytes, now: float) -> list[KeyEvent | Report]:
-        """Decode bytes that were read at a time."""
+        """Decode bytes that were read at time ``now``."""
         text, position = self._rest + self._characters.decode(data), 0
         events: list[KeyEvent | Report] = []
         while token := _TOKEN.match(text, position):
@@ -133,7 +133,7 @@ class KeyDecoder:
         return events
 
     def flush(self, now: float) -> list[KeyEvent | Report]:
-        """Decode what is pending as if nothing would follow."""
+        """Decode pending bytes as if none would follow."""
         was, self._rest = self._rest, ''
         is_key = was == _ESCAPE and not self._pasting
         return [KeyEvent('escape', KeyAction.TYPED, now)] if is_key else []
@@ -211,7 +211,7 @@ def _key(parameters: str, final: str) -> _Key | None:
 
 
 def _character_key_name(codes: list[int | None], modifiers: int, text: int | None) -> str:
-    """Name a key by what was typed, but by the Latin layout where that is not Latin."""
+    """Name a key by the typed character or, if that is not Latin, by the Latin layout."""
     code, shifted, base = (*codes, None, None)[:3]
     if code is None or code in _MODIFIER_CODES:
         return ''

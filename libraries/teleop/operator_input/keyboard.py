@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The keyboard of a person: keys from a terminal, releases from wherever they are known.
+"""Keyboard of the operator: keys from a terminal, releases from the best available source.
 
-A keyboard knows nothing of windows and layouts, so it is never read for what was pressed: that
-comes from the terminal, which has the focus. A character belongs to the key that went down just
-before it (or just after, when the two reports overtake each other); that key going up is its
-release. This is right for every layout, and what is typed elsewhere is never taken for a command.
+A keyboard device knows neither focus nor layout, so presses are never read from it: they come from
+the terminal, which has the focus. A character belongs to the key that went down just before it (or
+just after, when the two reports overtake each other); that key going up is its release. This works
+for every layout, and text typed in other windows is never taken for a command.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _SSH = ('SSH_CONNECTION', 'SSH_TTY', 'SSH_CLIENT')
 
 
 class ReleaseMatcher:
-    """Joins the events of a terminal and of keyboards; pure, times are in [s]."""
+    """Merges the events of a terminal and of keyboards; pure, times are in [s]."""
 
     def __init__(self) -> None:
         self._down: dict[int, float] = {}  # when each key went down, as long as it is down
@@ -59,7 +59,7 @@ class ReleaseMatcher:
         """Record a key that went down.
 
         Returns:
-            A press, if its character has come already; its release, if it was down.
+            A press, if its character was already received; its release, if it was down.
         """
         if code in MODIFIERS:
             return []
@@ -102,7 +102,7 @@ class ReleaseMatcher:
         return [event]
 
     def lose_all(self, now: float) -> list[KeyEvent]:
-        """Release all keys: a keyboard is lost, and will not report it."""
+        """Release all keys, as a lost keyboard will not report them."""
         lost = list(self._matched.values())
         self._matched.clear()
         self._down.clear()
@@ -122,7 +122,7 @@ class ReleaseMatcher:
 
 
 class Keyboards:
-    """All keyboards of this machine that may be read; feeds a matcher with their keys."""
+    """All readable keyboards of this machine; feeds a matcher with their keys."""
 
     def __init__(self, devices: InputDevices, matcher: ReleaseMatcher) -> None:
         self._search = DeviceSearch(
@@ -137,7 +137,7 @@ class Keyboards:
         return [device.info.name for device in self._open.values()]
 
     def filenos(self) -> list[int]:
-        """Return what to wait for."""
+        """Return the file descriptors to wait for."""
         return [device.fileno() for device in self._open.values()]
 
     def scan(self, now: float) -> None:
@@ -146,7 +146,7 @@ class Keyboards:
             self._open[device.info.path] = device
 
     def read(self, now: float) -> list[KeyEvent]:
-        """Read what has come, without waiting."""
+        """Read pending events, without waiting."""
         events: list[KeyEvent] = []
         for path, device in list(self._open.items()):
             with contextlib.suppress(DeviceError):
@@ -178,7 +178,7 @@ class Keyboards:
 def is_local(environment: Mapping[str, str], read_tmux: Callable[[], str] | None = None) -> bool:
     """Return whether the person at the terminal sits at a keyboard of this machine.
 
-    Inside tmux the person may have come by SSH after the shell was started; tmux knows.
+    Inside tmux, the person may have connected by SSH after the shell started; tmux records it.
 
     Args:
         environment: Variables of this process.
@@ -218,7 +218,7 @@ class ReleaseSource(Enum):
 
 
 class Keyboard:
-    """Key events of a person, with true releases where the machine has any."""
+    """Key events of the operator, with true releases if the machine provides them."""
 
     def __init__(
         self,
@@ -229,14 +229,14 @@ class Keyboard:
         kitty: bool = True,
         evdev: bool = True,
     ) -> None:
-        """Prepare; the terminal is touched on entering the context.
+        """Prepare; entering the context opens the terminal.
 
         Args:
             path: Device of the terminal.
-            devices: Input devices; those of this machine when it is None.
+            devices: Input devices; None for those of this machine.
             environment: Shows whether the terminal is on this machine.
             kitty: Use the releases that the terminal reports.
-            evdev: Use those of this machine's keyboards, if the terminal has none.
+            evdev: Use releases from this machine's keyboards, if the terminal reports none.
         """
         self._terminal = TerminalKeyboard(path, kitty=kitty)
         self._matcher = ReleaseMatcher()
@@ -245,7 +245,7 @@ class Keyboard:
 
     @property
     def release_source(self) -> ReleaseSource:
-        """Source of key releases at the moment."""
+        """Current source of key releases."""
         if self._terminal.stage is Stage.ACTIVE:
             return ReleaseSource.TERMINAL
         return ReleaseSource.KEYBOARD if self._keyboards.names else ReleaseSource.TIME_OUT
@@ -255,10 +255,10 @@ class Keyboard:
         return StatusLine(self._terminal)
 
     def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
-        """Wait for at most a time [s] for a key, or for one of other file descriptors.
+        """Wait at most ``timeout`` in [s] for a key, or for one of the other file descriptors.
 
         Returns:
-            What happened, in its order; empty after the time-out.
+            The events in order; empty after the time-out.
 
         Raises:
             TerminalError: The terminal was closed. All keys count as released.
@@ -275,7 +275,7 @@ class Keyboard:
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
-        """Give the terminal back for the time of a block, as for Ctrl-Z."""
+        """Restore the terminal for the duration of a block, as for Ctrl-Z."""
         self._keyboards.close()
         self._matcher.lose_all(time.monotonic())
         with self._terminal.paused():
@@ -287,6 +287,6 @@ class Keyboard:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the terminal back, whatever happened."""
+        """Restore the terminal, even after an error."""
         self._keyboards.close()
         self._terminal.__exit__()

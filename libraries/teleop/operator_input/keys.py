@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keys: what happens to them, and which is held, whether or not releases are reported.
+"""Key events, and the keys that are held, with or without reported releases.
 
 A keyboard repeats a held key: once after a delay (250 ms to 660 ms, the user's setting), then
-every 20 ms to 50 ms. A terminal passes on the characters alone. So a key whose release is not
-reported counts as held until its next character is overdue: first by the delay, later by the
-interval. The delay is learned from the first key that is held long enough; until then it is a
-guess.
+every 20 ms to 50 ms. A terminal passes on only the characters. So a key without reported release
+counts as held until its next character is overdue: first by the delay, later by the interval. The
+delay is learned from the first key that is held long enough; until then it is a guess.
 """
 
 from __future__ import annotations
@@ -21,29 +20,29 @@ class KeyAction(Enum):
     """What happened to a key."""
 
     PRESSED = 'pressed'
-    """It went down, and its release will be reported."""
+    """The key went down; its release will be reported."""
 
     REPEATED = 'repeated'
-    """It is still down; the keyboard repeats it."""
+    """The key is still down; the keyboard repeats it."""
 
     RELEASED = 'released'
-    """It went up."""
+    """The key went up."""
 
     TYPED = 'typed'
-    """It was pressed or repeated, which of both is not known; its release will not be reported."""
+    """The key was pressed or repeated, which is unknown; its release will not be reported."""
 
     ALL_RELEASED = 'all released'
-    """Whatever was down counts as up: the window lost the focus, or the keyboard is gone."""
+    """All keys count as up: the window lost the focus, or the keyboard is gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class KeyEvent:
-    """One thing that happened to a key, on a monotonic clock [s].
+    """One event of a key, with its time on a monotonic clock in [s].
 
     A key is named by the character that it types (``i``, ``I``, ``<``), or ``space``, ``enter``,
     ``tab``, ``escape``, ``backspace``, ``up``, ``down``, ``left``, ``right``, ``home``, ``end``,
-    ``page_up``, ``page_down``, ``insert``, ``delete``, ``f1`` to ``f12``; with ``ctrl+`` or
-    ``alt+`` before it where these were down. The name is empty for all keys.
+    ``page_up``, ``page_down``, ``insert``, ``delete``, ``f1`` to ``f12``; with the prefix
+    ``ctrl+`` or ``alt+`` if these were down. An empty name means all keys.
     """
 
     key: str
@@ -52,12 +51,12 @@ class KeyEvent:
 
     @property
     def is_stroke(self) -> bool:
-        """Whether a person, or the keyboard for them, wants what the key does once (again)."""
+        """Whether the event triggers the function of the key: a press or a repeat."""
         return self.action in {KeyAction.PRESSED, KeyAction.REPEATED, KeyAction.TYPED}
 
 
 def all_released(time: float) -> KeyEvent:
-    """Return the event that lets go of every key."""
+    """Return the event that releases all keys."""
     return KeyEvent('', KeyAction.ALL_RELEASED, time)
 
 
@@ -67,13 +66,13 @@ MARGIN = 1.2  # a repeat may come later by this factor
 
 
 class AutoRepeat:
-    """Time-outs of the two stages [s], and what was learned of the keyboard's delay."""
+    """Time-outs of delay and interval in [s], and the learned delay of the keyboard."""
 
     def __init__(self, first: float = 0.5, repeat: float = 0.15) -> None:
-        """Start with guesses: after the first character of a key, and after each further one.
+        """Start with guesses for the time after the first character and after each further one.
 
         Raises:
-            ValueError: A time-out is not positive, or the second one is the longer one.
+            ValueError: A time-out is not positive, or the second is longer than the first.
         """
         if not 0 < repeat <= first:
             raise ValueError(f'time-outs {first} s and {repeat} s: wanted 0 < repeat <= first')
@@ -91,18 +90,18 @@ class AutoRepeat:
 
     @property
     def longest(self) -> float:
-        """Bound of every time-out that this object will ever give."""
+        """Upper bound of all time-outs of this object."""
         return max(self._guess, SLOWEST_DELAY * MARGIN, self.repeat)
 
     def is_new_stroke(self, gap: float) -> bool:
-        """Return whether a character came from a finger, some time after the first one of its key.
+        """Return whether a character, ``gap`` [s] after the first of its key, is a new press.
 
-        Only a learned delay can decide: what comes much before it is no repeat.
+        Only a learned delay can decide: a character long before it is no repeat.
         """
         return self._delay is not None and self.repeat < gap < self._delay / MARGIN
 
     def learn(self, gap: float | None) -> None:
-        """Learn from the time since the same character; None where the one before was another."""
+        """Learn from the time since the same character; None if the previous one was different."""
         if gap is None:
             self._gaps.clear()
             return
@@ -117,9 +116,9 @@ class HeldKeys:
     """The keys that are down, in the order in which they went down. Pure; times are in [s].
 
     A key that was PRESSED is held until it is RELEASED. A key that was TYPED is held until its
-    next character is overdue. The newest key alone counts, so there is never more than one
-    command; when it is released, the one before counts again if that is still held. Of typed keys
-    only the newest is held at all: the keyboard repeats no other.
+    next character is overdue. Only the newest key counts, so there is never more than one command;
+    when it is released, the previous one counts again if it is still held. Of typed keys, only the
+    newest is held: the keyboard repeats no other.
     """
 
     def __init__(self, auto_repeat: AutoRepeat | None = None) -> None:
@@ -128,7 +127,7 @@ class HeldKeys:
         self._typed: tuple[str, float, float] | None = None  # key, its first and last time
 
     def feed(self, event: KeyEvent) -> None:
-        """Process an event; events come in the order of their times."""
+        """Process an event; events must be in order of time."""
         for key in [key for key, until in self._until.items() if until <= event.time]:
             del self._until[key]
         match event.action:
@@ -160,7 +159,7 @@ class HeldKeys:
         return first == last
 
     def deadline(self, now: float) -> float:
-        """Return when a held key is up unless an event of it comes before; may be infinite."""
+        """Return when a held key expires without a further event; may be infinite."""
         return min((until for until in self._until.values() if now < until), default=math.inf)
 
     def clear(self) -> None:

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A program with which a person moves a robot: what keys and sticks mean, and the loop.
+"""Teleoperation program: the mapping of keys and sticks to commands, and the main loop.
 
-A mapping returns commands, which move the robot as long as they are wanted, and requests, which
-are made once: a text is shown to the person, a :class:`ProgramRequest` concerns the program, and
-all others are the robot's. Mappings are pure: times are handed in, on a monotonic clock [s].
+A mapping returns commands, which move the robot while they last, and one-time requests: a text is
+shown to the operator, a :class:`ProgramRequest` goes to the program, and any other request to the
+robot. Mappings are pure: callers pass times, on a monotonic clock in [s].
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ RESTS = 3  # commands to rest at the end of a motion: one might be lost, more wo
 
 
 class CommandStream(Generic[T]):
-    """Turns what is wanted now into messages; pure, times are in [s].
+    """Converts the wanted command to messages to publish; pure, times are in [s].
 
-    A change is published at once, an unchanged command once a period. A source that is idle is
-    silent, so that it does not overrule others.
+    A change is published at once, an unchanged command once a period. An idle source publishes
+    nothing, so that it does not override others.
     """
 
     def __init__(self, period: float, rest: Callable[[T | None], T]) -> None:
         """Start idle.
 
         Args:
-            period: Time between two messages of the same command.
-            rest: Gives the command that ends a motion; it gets the last command of the motion, or
-                None when there was none.
+            period: Time between two messages of an unchanged command.
+            rest: Returns the command that ends a motion, from the last command of the motion, or
+                None without one.
 
         Raises:
             ValueError: The period is not positive.
@@ -58,28 +58,28 @@ class CommandStream(Generic[T]):
 
     @property
     def is_idle(self) -> bool:
-        """Whether there is nothing to publish until a command is wanted."""
+        """Whether nothing is published until a command is wanted."""
         return self._wanted is None and self._rests == 0
 
     def is_rest(self, command: T) -> bool:
-        """Return whether a command moves nothing."""
+        """Return whether a command means rest."""
         return command == self._rest(command)
 
     def due(self) -> float:
-        """Return when step() has to be called at the latest; infinite when idle."""
+        """Return the latest time for the next step(); infinite when idle."""
         return math.inf if self.is_idle else self._due
 
     def stop(self) -> None:
-        """Publish rests even if nothing moves: a person requested a stop."""
+        """Publish rest commands even if nothing moves: the operator requested a stop."""
         self._wanted, self._rests, self._due = None, RESTS, -math.inf
 
     def end(self) -> None:
-        """Publish rests at the end of the program, if it ever moved anything."""
+        """Publish rest commands at the end of the program, if it ever moved anything."""
         if self._moved is not None:
             self.stop()
 
     def step(self, wanted: T | None, now: float) -> T | None:
-        """Return what to publish now, None for nothing; None is wanted by an inactive source."""
+        """Return the command to publish now, or None; an inactive source passes None."""
         if wanted != self._wanted:
             if wanted is None:
                 self._rests = RESTS
@@ -95,15 +95,15 @@ class CommandStream(Generic[T]):
 
 
 class ProgramRequest(Enum):
-    """What a person requests of any program."""
+    """Request of the operator to the program itself."""
 
     QUIT = auto()
     SUSPEND = auto()
-    """Give the terminal back to the shell for a while."""
+    """Return the terminal to the shell for a while."""
 
 
 class Robot(Protocol):
-    """Who is commanded. Nothing of it waits, but flush()."""
+    """The commanded robot. Only flush() blocks."""
 
     say: Callable[[str], None]  # shows the person a message; the program sets it to its screen
 
@@ -114,14 +114,14 @@ class Robot(Protocol):
         """Send a request of a mapping."""
 
     def serve(self, now: float) -> None:
-        """Process answers, and send what is due."""
+        """Process answers, and send requests that are due."""
 
     def flush(self) -> None:
-        """Wait until what was published has arrived, for a while at most."""
+        """Wait until published messages have arrived, for a limited time."""
 
 
 class TeleopMapping(ABC):
-    """What the events of a source mean to a robot."""
+    """Maps the events of a source to commands and requests for a robot."""
 
     introduction = ''  # what a person at a terminal reads first
 
@@ -131,14 +131,14 @@ class TeleopMapping(ABC):
 
     @abstractmethod
     def feed(self, event: Any) -> Sequence[object]:  # noqa: ANN401  # of its source
-        """Map an event of the source to the person's requests."""
+        """Map an event of the source to the operator's requests."""
 
     @abstractmethod
     def wanted(self, now: float) -> object | None:
-        """Return the command that is wanted; None when nothing asks for one."""
+        """Return the wanted command; None without one."""
 
     def status(self, now: float) -> list[StatusPart]:  # of a program at a terminal
-        """Return what the status line shows, what matters most first."""
+        """Return the parts of the status line, the most important first."""
         return []
 
     def step(self, now: float) -> object | None:
@@ -155,7 +155,7 @@ class TeleopMapping(ABC):
 
 
 class KeyMapping(TeleopMapping):
-    """What keys mean: a command as long as a key is held."""
+    """Mapping of keys: a command lasts as long as its key is held."""
 
     def __init__(self, robot: Robot, held: HeldKeys, stream: CommandStream[Any]) -> None:
         super().__init__(robot, stream)
@@ -172,10 +172,10 @@ class KeyMapping(TeleopMapping):
 
 
 class DeadmanMapping(TeleopMapping):
-    """What a gamepad means: a command as long as its deadman is held.
+    """Mapping of a gamepad: a command lasts as long as the deadman is held.
 
-    A motion ends when the gamepad has not changed for longer than a hand holds it so still; the
-    deadman has to be released and pressed anew then.
+    A motion ends when the gamepad has not changed for longer than a hand can hold it still; then
+    the deadman must be released and pressed again.
     """
 
     def __init__(
@@ -185,7 +185,7 @@ class DeadmanMapping(TeleopMapping):
         stream: CommandStream[Any],
         warn: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Start idle; a motion that ends because the gamepad does not change is warned of."""
+        """Start idle; ``warn`` reports a motion that ends because the gamepad does not change."""
         super().__init__(robot, stream)
         self.state = AT_REST  # last state of the gamepad
         # whether a motion has ended so, and the deadman was not released since
@@ -197,11 +197,11 @@ class DeadmanMapping(TeleopMapping):
 
     @property
     def grip(self) -> Grip:
-        """What the person allows at the moment."""
+        """The motion that the operator permits now."""
         return Grip.RELEASED if self.expired else self._deadman.grip(self.state)
 
     def take(self, state: GamepadState) -> GamepadState:
-        """Store a state of the gamepad, at rest when there is none; return the previous one."""
+        """Store a state of the gamepad (at rest without one); return the previous state."""
         before, self.state = self.state, state
         changed = state != before or state.changes != before.changes
         self._is_alive |= changed
@@ -211,7 +211,7 @@ class DeadmanMapping(TeleopMapping):
         return before
 
     def step(self, now: float) -> object | None:
-        """Return what to publish now; call it after every state and when it is due."""
+        """Return the command to publish now; call it after every state and when it is due."""
         if self._is_alive or not self._moves(now):
             self._is_alive, self._changed_at = False, now
         elif now - self._changed_at >= self._timeout.duration:
@@ -251,9 +251,9 @@ RELEASE_WORDS = {
 
 
 class TeleopProgram:
-    """One person and one robot, in one thread; whatever ends it, the robot gets commands to rest.
+    """Runs one operator and one robot in one thread; at any end, it commands the robot to rest.
 
-    At a terminal it has a status line, and Ctrl-Z.
+    At a terminal it has a status line, and supports Ctrl-Z.
     """
 
     # serves the node of the program without waiting, in each turn of the loop
@@ -265,8 +265,8 @@ class TeleopProgram:
         """Prepare.
 
         Args:
-            source: What is read; open.
-            mapping: What it means to the robot.
+            source: The open input source.
+            mapping: Maps the source to commands.
             stop: Ends the program.
         """
         self._source = source
@@ -280,10 +280,10 @@ class TeleopProgram:
             self._robot.say = self._line.message
 
     def run(self) -> None:
-        """Serve until the person quits or the event is set.
+        """Run until the operator quits or ``stop`` is set.
 
         Raises:
-            OperatorInputError: The source is gone.
+            OperatorInputError: The source is lost.
         """
         if self._line is not None:
             self._line.message(self._mapping.introduction)
@@ -332,7 +332,7 @@ class TeleopProgram:
             self._robot.say('going on')
 
     def _rest(self) -> None:
-        """Publish the last rests, see them off, and leave the line as the last thing shown."""
+        """Publish the last rest commands, wait until they are sent, and keep the status line."""
         self._mapping.end()
         for _ in range(RESTS):
             self._step()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes of keyboard and gamepad programs have in common; needs ROS."""
+"""Common parts of the nodes of keyboard and gamepad programs; needs ROS."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ MAX_DEADMAN_TIMEOUT = 3600.0  # [s]
 
 
 class TeleopNode(Node):
-    """The node of a program with which a person moves a robot."""
+    """Node of a teleoperation program."""
 
     source: Keyboard | Gamepad  # what the person's input is read from
     mapping: TeleopMapping  # what it means to the robot
 
 
 def declare_keyboard(node: Node) -> tuple[Keyboard, HeldKeys]:
-    """Declare how keys and their releases are read.
+    """Declare the parameters for keys and their releases; return their readers.
 
     Raises:
-        ParameterError: A value is of another kind or out of its range.
+        ParameterError: A value has the wrong type or is out of range.
     """
     read = ParameterReader(node)
     first = read.number('first_timeout', 0.5, (0.05, 2.0), 'first time-out of a key [s]')
@@ -51,12 +51,12 @@ def declare_gamepad(node: Node, devices: InputDevices | None) -> tuple[Gamepad, 
 
     Args:
         node: The node.
-        devices: Where gamepads are; those of this machine when it is None.
+        devices: Where to search for gamepads; None for those of this machine.
 
     Raises:
-        ParameterError: A value is of another kind or out of its range.
+        ParameterError: A value has the wrong type or is out of range.
         PresetError: There is no preset of that name.
-        SettingError: The values make no sense together.
+        SettingError: The values conflict.
     """
     read, times = ParameterReader(node), (0.5, MAX_DEADMAN_TIMEOUT)
     deadman = Deadman(
@@ -82,7 +82,7 @@ def declare_gamepad(node: Node, devices: InputDevices | None) -> tuple[Gamepad, 
 
 
 def serve_teleop(node: TeleopNode, stop: threading.Event) -> None:
-    """Serve a person and the node until either ends; the node is gone then."""
+    """Run the operator's program and spin the node until either ends; destroy the node."""
     with node.source as source:
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
@@ -98,13 +98,13 @@ def serve_teleop(node: TeleopNode, stop: threading.Event) -> None:
 def run_teleop(
     name: str, make: Callable[[], TeleopNode], *errors: type[Exception], patient: bool
 ) -> int:
-    """Run a program until the person quits, or Ctrl-C; return the exit code.
+    """Run a program until the operator quits or Ctrl-C; return the exit code.
 
     Args:
-        name: Name for the log.
-        make: Makes the node.
-        *errors: What is logged as one line when it cannot be made.
-        patient: A second Ctrl-C does not end it at once, which would leave a terminal as it is.
+        name: Logger name.
+        make: Creates the node.
+        *errors: Exceptions of ``make`` that are logged as one line.
+        patient: A second Ctrl-C does not end it at once, as the terminal must be restored.
     """
 
     def serve(stop: threading.Event) -> None:

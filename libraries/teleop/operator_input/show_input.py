@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run operator_input show_keys`` and ``show_gamepad``: what is read, by its names."""
+"""``ros2 run operator_input show_keys`` and ``show_gamepad``: print key and gamepad events."""
 
 from __future__ import annotations
 

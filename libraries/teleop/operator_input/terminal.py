@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of a terminal, with their releases where the terminal reports them; and a line of status.
+"""Reads keys from a terminal, with releases if the terminal reports them; shows a status line.
 
 A terminal with the Kitty keyboard protocol answers ``CSI ? u``; every terminal answers ``CSI c``.
-If the second answer comes without the first, there is no such protocol. Nothing waits for either:
-until the protocol is there, keys are read the old way.
+If only the second answer arrives, the protocol is not supported. The program waits for neither:
+until the protocol is active, keys are read without releases.
 
-A key whose release the terminal reports is held until then. Should the line to the terminal stall,
-the report never comes; so the terminal is probed as long as a key is held.
+A key whose release the terminal reports is held until then. If the connection to the terminal
+stalls, that report never arrives; so the terminal is probed while a key is held.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _IFLAG, _LFLAG, _CC = 0, 3, 6  # of the list that termios.tcgetattr returns
 
 
 class Stage(Enum):
-    """How far the negotiation of the Kitty keyboard protocol is."""
+    """Stage of the negotiation of the Kitty keyboard protocol."""
 
     IDLE = 'idle'
     REQUESTED = 'requested'
@@ -61,7 +61,7 @@ class Stage(Enum):
 
 
 class TerminalDialogue:
-    """What the terminal was asked; pure: takes reports, returns what to write."""
+    """Dialogue with the terminal; pure: processes reports, returns the text to write."""
 
     def __init__(self) -> None:
         self.stage = Stage.IDLE  # how far its promise to report releases has got
@@ -71,22 +71,22 @@ class TerminalDialogue:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether answers may still come."""
+        """Whether answers are still pending."""
         return self._attributes_due > 0 or self._unanswered_since is not None
 
     def start(self) -> str:
-        """Request the protocol."""
+        """Return the request for the protocol."""
         self.stage = Stage.REQUESTED
         self._attributes_due += 1
         return QUERY
 
     def stop(self) -> str:
-        """Return what gives the terminal back as it was."""
+        """Return the sequence that restores the terminal."""
         was, self.stage = self.stage, Stage.IDLE
         return POP if was in {Stage.PUSHED, Stage.ACTIVE} else ''
 
     def take(self, report: Report) -> str:
-        """Process a report of the terminal; return what to write."""
+        """Process a report of the terminal; return the text to write."""
         if report.kind is ReportKind.DEVICE_ATTRIBUTES:
             return self._take_attributes()
         if report.kind is not ReportKind.KITTY_FLAGS:
@@ -101,7 +101,7 @@ class TerminalDialogue:
         return ''
 
     def received(self) -> None:
-        """Count anything that the terminal sent as a sign of life."""
+        """Record that the terminal sent something, so it is alive."""
         self._unanswered_since = None
 
     def probe(self, now: float) -> str:
@@ -126,18 +126,18 @@ class TerminalDialogue:
 
 
 class TerminalKeyboard:
-    """Reads keys from a terminal; a context manager that always gives the terminal back.
+    """Reads keys from a terminal; a context manager that always restores the terminal.
 
-    Works in any terminal, over SSH and inside tmux or screen. Characters come at once, unechoed,
-    and Ctrl-C is one of them. Nothing waits for the terminal's answers: a key that is pressed in
-    the first moment is simply TYPED.
+    Works in any terminal, over SSH and inside tmux or screen. Characters arrive at once, without
+    echo, Ctrl-C included. It does not wait for the terminal's answers: a key pressed before them
+    is just TYPED.
 
-    The terminal is opened anew by its path, so that reading without waiting does not change the
-    standard input, which the shell shares. What is printed is formatted by it as usual.
+    It opens the terminal by its path, so that non-blocking reads do not change the standard input,
+    which the shell shares. Printed text is formatted as usual.
     """
 
     def __init__(self, path: str = CONTROLLING_TERMINAL, *, kitty: bool = True) -> None:
-        """Prepare; the terminal is touched on entering the context."""
+        """Prepare; entering the context opens the terminal."""
         self._path = path
         self._kitty = kitty
         self._descriptor: int | None = None
@@ -147,14 +147,14 @@ class TerminalKeyboard:
 
     @property
     def stage(self) -> Stage:
-        """How far the terminal's promise to report releases has got."""
+        """Stage of the negotiation about key releases."""
         return self._dialogue.stage
 
     def fileno(self) -> int:
-        """Return the file descriptor, to wait for it with others.
+        """Return the file descriptor, to wait for it together with others.
 
         Raises:
-            TerminalError: Outside of the context.
+            TerminalError: Called outside of the context.
         """
         if self._descriptor is None:
             raise TerminalError('the terminal is not open: use the keyboard in a with statement')
@@ -163,14 +163,14 @@ class TerminalKeyboard:
     def write(self, text: str) -> None:
         """Write characters and control sequences, as many as the terminal takes at once.
 
-        A terminal that is stuck loses text; the robot must not wait for it.
+        A blocked terminal loses text, as the robot must not wait for it.
         """
         descriptor = self.fileno()
         with contextlib.suppress(OSError):
             os.write(descriptor, text.encode())
 
     def width(self) -> int:
-        """Return its width [characters]."""
+        """Return the width of the terminal in [characters]."""
         descriptor = self.fileno()
         try:
             return os.get_terminal_size(descriptor).columns or 80
@@ -178,7 +178,7 @@ class TerminalKeyboard:
             return 80
 
     def read(self, timeout: float = 0.0) -> list[KeyEvent]:
-        """Read what has happened to the keys; a time-out [s] ends with the first byte.
+        """Read key events; wait for the first byte at most ``timeout`` in [s].
 
         Raises:
             TerminalError: The terminal was closed. All keys count as released.
@@ -201,7 +201,7 @@ class TerminalKeyboard:
         return [*events, *self._check_line(now)]
 
     def longest_wait(self) -> float:
-        """Return after which time read() wants to be called again [s], whatever happens."""
+        """Return the time in [s] after which read() must be called again at the latest."""
         if self._decoder.is_pending:
             return ESCAPE_TIMEOUT
         return PROBE_PERIOD if self._decoder.is_holding else 60.0
@@ -210,7 +210,7 @@ class TerminalKeyboard:
         """Open the terminal and negotiate with it.
 
         Raises:
-            TerminalError: It cannot be opened, or is no terminal.
+            TerminalError: The device cannot be opened, or is no terminal.
         """
         self._open()
         self._decoder, self._dialogue = KeyDecoder(), TerminalDialogue()
@@ -218,7 +218,7 @@ class TerminalKeyboard:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the terminal back."""
+        """Restore the terminal."""
         if self._descriptor is None:
             return
         self.write(_MODES_OFF + self._dialogue.stop())
@@ -232,7 +232,7 @@ class TerminalKeyboard:
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
-        """Give the terminal back for the time of the block, as for Ctrl-Z."""
+        """Restore the terminal for the duration of the block, as for Ctrl-Z."""
         self.__exit__()
         try:
             yield
@@ -274,7 +274,7 @@ class TerminalKeyboard:
         return data
 
     def _drain(self) -> None:
-        """Read the answers that are still on their way."""
+        """Read pending answers of the terminal."""
         deadline = time.monotonic() + DRAIN_TIMEOUT
         while self._dialogue.is_waiting and (
             data := self._read_bytes(deadline - time.monotonic())
@@ -285,7 +285,7 @@ class TerminalKeyboard:
                     self._dialogue.take(report)
 
     def _check_line(self, now: float) -> list[KeyEvent]:
-        """Probe the terminal while a key is held, and let go when it is silent."""
+        """Probe the terminal while a key is held; release all keys if it does not answer."""
         if not self._decoder.is_holding:
             return []
         if self._dialogue.is_lost(now):
@@ -302,7 +302,7 @@ RESET, CLEAR_LINE = '\x1b[0m', '\r\x1b[K'
 
 
 class Style(Enum):
-    """How a part looks, as a control sequence of ECMA-48 (SGR)."""
+    """Style of a part, as a control sequence of ECMA-48 (SGR)."""
 
     PLAIN = ''
     BOLD = '\x1b[1m'
@@ -316,14 +316,14 @@ StatusPart = tuple[str, Style]
 
 
 def status_text(parts: Iterable[StatusPart], *, colour: bool) -> str:
-    """Join the parts of a status line, what matters most first: a narrow window cuts the rest."""
+    """Join the parts of a status line, the most important first: a narrow window cuts the rest."""
     return ' | '.join(
         f'{style.value}{text}{RESET}' if colour and style.value else text for text, style in parts
     )
 
 
 class StatusLine:
-    """Shows a line in place; never wider than the window, so that it never wraps.
+    """Shows a status line in place; it is cut to the window width, so it never wraps.
 
     Texts may contain colours.
     """
@@ -333,25 +333,25 @@ class StatusLine:
         self._shown = ''
 
     def show(self, text: str) -> None:
-        """Show a line, if it is not there yet."""
+        """Show a line, unless it is already shown."""
         line = fitted(text, self._output.width() - 1)
         if line != self._shown:
             self._output.write(CLEAR_LINE + line)
             self._shown = line
 
     def message(self, text: str) -> None:
-        """Write lines above it, which stay."""
+        """Write permanent lines above the status line."""
         self._output.write(f'{CLEAR_LINE}{text}\n{self._shown}')
 
     def end(self) -> None:
-        """Move below the line, which stays as it is."""
+        """Move below the line, which stays visible."""
         if self._shown:
             self._output.write('\n')
         self._shown = ''
 
 
 def fitted(text: str, width: int) -> str:
-    """Cut a line to some columns; colours are kept, and switched off where it is cut."""
+    """Cut a line to ``width`` columns; colours are kept, and reset at the cut."""
     result: list[str] = []
     left, position = width, 0
     while position < len(text):

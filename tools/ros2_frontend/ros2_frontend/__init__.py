@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The `ros2` command for a ROS 2 Jazzy that was installed from wheels.
+"""The `ros2` command for a ROS 2 Jazzy installation from wheels.
 
-Layers, each importing only what stands below it:
+Layers; each imports only those below it:
 
-* ``verbs``: one module per group of commands; arguments in, text out
-* ``ros``: the only place that touches rclpy: session, graph, QoS, calls, recorder, player
-* ``bag``: what ``ros2 bag`` decides and prints; pure
-* ``index``: packages and interface definitions on disk
-* ``messages``: messages to YAML and CSV, YAML to messages; pure
-* ``cli``: the command tree, argument types, errors, suggestions; pure
+* ``verbs``: one module per group of commands; arguments in, text out * ``ros``: the only place
+that touches rclpy: session, graph, QoS, calls, recorder, player * ``bag``: decisions and output of
+``ros2 bag``; pure * ``index``: packages and interface definitions on disk * ``messages``: messages
+to YAML and CSV, YAML to messages; pure * ``cli``: the command tree, argument types, errors,
+suggestions; pure
 """
 
 import os

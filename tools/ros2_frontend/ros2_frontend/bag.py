@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as a command opens them, and which of their topics it chooses."""
+"""Opens recordings for a command, and selects their topics."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ CHOICE = (
         help='YAML file with QoS profiles for specific topics.',
     ),
 )
-"""Options by which topics are chosen, of those that are there or are recorded."""
+"""Options that select topics, from the graph or a recording."""
 
 
 @contextlib.contextmanager
 def bag_errors() -> Iterator[None]:
-    """End the command with the message of a `BagError`."""
+    """Convert a `BagError` in the block to a `FrontendError` with its message."""
     try:
         yield
     except BagError as error:
@@ -53,7 +53,7 @@ def bag_errors() -> Iterator[None]:
 
 
 def open_bag(path: str) -> BagReader:
-    """Open a recording, a folder or a file; print on stderr when it was not finished."""
+    """Open a recording, a folder or a file; report an unfinished one on stderr."""
     with bag_errors():
         reader = BagReader(Path(path))
     if not reader.finished and Path(path).is_dir():
@@ -69,7 +69,7 @@ def load_overrides(path: str | None) -> dict[str, OfferedQos]:
     """Read a file with QoS profiles by topic; None for no overrides.
 
     Raises:
-        FrontendError: It cannot be read, or has what no QoS profile has.
+        FrontendError: The file cannot be read, or has entries unknown in QoS profiles.
     """
     if path is None:
         return {}
@@ -88,12 +88,12 @@ def load_overrides(path: str | None) -> dict[str, OfferedQos]:
 
 
 def topic_filter(args: Namespace, everything: bool, hidden: bool) -> Accepts:
-    """Make the filter of a command line as rosbag2 does: what is chosen, less what is excluded.
+    """Make the topic filter of a command line as in rosbag2: selected less excluded topics.
 
-    Everything chooses all topics; hidden ones count only where that says so, or by their names.
+    `everything` selects all topics; hidden ones only with `hidden`, or by their names.
 
     Raises:
-        FrontendError: A regular expression is none.
+        FrontendError: A regular expression is malformed.
     """
     topics, excluded = (set(map(absolute, names)) for names in (args.topics, args.exclude_topics))
     types = getattr(args, 'topic_types', ())

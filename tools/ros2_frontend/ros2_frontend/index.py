@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed: packages, executables, and interfaces with their definitions and classes."""
+"""Finds installed packages, executables, and interfaces with their definitions and classes."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
     """Return the prefix path of a package.
 
     Raises:
-        UnknownNameError: There is none of that name; it names the nearest, or what makes one of
-            this workspace known. The message may hold `{0}` for the name.
+        UnknownNameError: There is no such package; the error names the nearest, or how to source
+            one of this workspace. `message` may contain `{0}` for the name.
     """
     prefixes = package_prefixes()
     if package not in prefixes:
@@ -45,7 +45,7 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
 
 
 def _remedy(package: str, workspace: Path) -> str:
-    """Return the remedy for a package whose sources are in the workspace."""
+    """Return the remedy for a package that is in the workspace but not found."""
     folders = ('.', 'libraries', 'interfaces')
     if not any((workspace / folder / package / 'package.xml').is_file() for folder in folders):
         return ''
@@ -98,7 +98,7 @@ def interfaces_of(package: str, kinds: Iterable[Kind] = Kind) -> list[str]:
 
 
 def all_interfaces(kinds: Iterable[Kind] = Kind) -> Mapping[str, list[str]]:
-    """Return the names of all interfaces by package, both sorted; no package without any."""
+    """Return the names of all interfaces by package, both sorted; omit packages without any."""
     from ament_index_python import get_resources
 
     wanted = tuple(kinds)
@@ -114,7 +114,8 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
     """Import the Python class of `package/kind/Name`, or `package/Name`.
 
     Raises:
-        FrontendError: It cannot be imported; after the refusal of ros2cli, it names the nearest.
+        FrontendError: It cannot be imported; the message is `refusal` (as in ros2cli) and the
+            nearest name.
     """
     parts = name.split('/')
     if len(parts) == 2:
@@ -130,7 +131,7 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
 
 
 def definition_path(name: str) -> Path:
-    """Return the file that defines `package/kind/Name`: `.idl` only where written in that."""
+    """Return the file that defines `package/kind/Name`: `.idl` only if it is the source."""
     from ament_index_python import get_package_share_directory
 
     parts = name.split('/')
@@ -152,8 +153,8 @@ def expand(
 ) -> Iterator[str]:
     """Yield the lines of `package/kind/Name`, each field of a message type followed by its lines.
 
-    Comments and blank lines are shown of the type itself, and of those of its fields, as the
-    switches say. What stands deeper has one tab more for each level.
+    `comments` keeps comments and blank lines of the type, `nested_comments` those of its fields'
+    types. Each level is indented by one more tab.
     """
     shown = nested_comments if depth else comments
     for line in read(name).splitlines():

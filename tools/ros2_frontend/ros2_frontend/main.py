@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The entry point: parse, do, and leave with the exit code of ros2cli.
+"""The entry point: parse, execute, and exit with the exit code of ros2cli.
 
 | code | when |
 |---|---|
@@ -28,11 +28,11 @@ _BROKEN_PIPE = 128 + signal.SIGPIPE
 
 
 class _Later(ModuleType):
-    """A module that is imported when something of it is needed.
+    """A module that is imported on first use.
 
-    Generated messages import numpy, a quarter of the time of a command, and only those with arrays
-    of fixed length use it; rclpy imports yaml, for parameters in files. The lazy loader of
-    importlib would load them at ``import`` already.
+    Generated messages import numpy, which takes a quarter of a command's time, but only those with
+    fixed-length arrays use it; rclpy imports yaml for parameter files. The lazy loader of
+    importlib would load both already at ``import``.
     """
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # as in ModuleType
@@ -79,7 +79,7 @@ def _run(words: list[str]) -> int:
 
 
 def _leave(code: int) -> int:
-    """Make sure that a closed stdout does not speak up when Python exits."""
+    """Suppress the error that a closed stdout causes when Python exits."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:

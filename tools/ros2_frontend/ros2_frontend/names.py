@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names in the ROS graph, and for what rclpy and the generated interfaces leave untyped."""
+"""Names in the ROS graph, and type aliases for untyped objects of rclpy and messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NamesAndTypes: TypeAlias = list[tuple[str, list[str]]]
 
 @dataclass(frozen=True, slots=True, order=True)
 class NodeName:
-    """The name of a node: `/ns/name`, its last part, and what stands before it (or `/`)."""
+    """The name of a node: `/ns/name`, its last part, and its namespace (or `/`)."""
 
     full_name: str
     name: str

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Verbs as they are declared, the tree of commands as data, and the parser of one command line.
+"""Declaration of verbs, the command tree as data, and the parser of one command line.
 
-A command names the module and the verb that do it, so that `ros2 --help` imports none of them and
-`ros2 topic list` imports only its own. Summaries are those of ros2cli (Jazzy).
+Each command names the module and verb that implement it, so that `ros2 --help` imports none and
+`ros2 topic list` only its own. Summaries are those of ros2cli (Jazzy).
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ class FrontendError(RuntimeError):
 
 
 class UnknownNameError(FrontendError, LookupError):
-    """Nothing has the name that was given, e.g. ``topic info /chater``."""
+    """The given name is unknown, e.g. ``topic info /chater``."""
 
 
 class FieldValueError(FrontendError, ValueError):
-    """A value that a message cannot take, e.g. an unknown field or text for a number."""
+    """A value does not fit the message, e.g. an unknown field or text for a number."""
 
 
 class NoAnswerError(FrontendError, TimeoutError):
-    """A service that did not appear or did not answer in time."""
+    """A service did not appear or did not answer in time."""
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Return a line that asks whether one of up to three near names was meant, if any."""
+    """Return a line that suggests up to three similar names; empty without any."""
     from difflib import get_close_matches
 
     near = [f"'{each}'" for each in get_close_matches(name, list(known), cutoff=_ALIKE)]
@@ -43,17 +43,17 @@ def hint(name: str, known: Iterable[str]) -> str:
 
 
 Argument = Callable[[Any], object]
-"""Adds one argument, or some that belong together, to a parser of argparse or a group of one."""
+"""Adds one argument, or a set of them, to a parser of argparse or one of its groups."""
 
 Main = Callable[[Namespace], 'int | None']
-"""Does the verb; the exit code, of which None is 0. Raises FrontendError, for the user."""
+"""Executes the verb; returns the exit code, None for 0. Raises FrontendError for the user."""
 
 
 N = TypeVar('N', int, float)
 
 
 def argument(*names: str, **options: object) -> Argument:
-    """Declare an argument as argparse does."""
+    """Declare an argument with the options of argparse."""
     return lambda parser: parser.add_argument(*names, **options)
 
 
@@ -75,14 +75,14 @@ def exclusive(*arguments: Argument) -> Argument:
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """A verb of `ros2`: its arguments, in the order of the help page, and what does it."""
+    """A verb of `ros2`: its arguments, in the order of the help page, and its function."""
 
     arguments: tuple[Argument, ...]
     main: Main
 
 
 def verb(*arguments: Argument) -> Callable[[Main], Verb]:
-    """Make a verb of a function."""
+    """Decorate a function as a verb."""
     return lambda main: Verb(arguments, main)
 
 
@@ -116,7 +116,7 @@ GRAPH_ARGUMENTS = (
     flag('-s', '--use-sim-time', help='Enable ROS simulation time'),
     flag('--no-daemon', help='Accepted and without effect: there is no daemon'),
 )
-"""The options of every verb that looks at the ROS graph."""
+"""Options of every verb that reads the ROS graph."""
 
 
 def content(name: str, help_: str, stdin_help: str) -> Argument:
@@ -199,17 +199,17 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     'topic type': ("Print a topic's type", 'topic:type_of'),
     'wtf': ('Use `wtf` as alias to `doctor`', 'doctor:doctor'),
 }
-"""One line for the help page of each command, and `module:verb` below `ros2_frontend.verbs`; of
-a group of verbs that is empty."""
+"""Help line of each command, and its `module:verb` in `ros2_frontend.verbs`; empty for a group of
+verbs."""
 _WITH_HIDDEN_NAMES = ('service', 'topic')
 
 
 def build(argv: Sequence[str]) -> tuple[ArgumentParser, ArgumentParser, Verb | None]:
-    """Make the parser for one command line; only the named command has its arguments.
+    """Build the parser for one command line; only the named command gets its arguments.
 
     Returns:
-        The root parser; the parser whose help is shown when no verb is named; the verb that the
-        arguments name, None for `ros2` or `ros2 topic` alone.
+        The root parser; the parser whose help is shown if no verb is named; the named verb, None
+        for `ros2` or `ros2 topic` alone.
     """
     words = [word for word in argv if not word.startswith('-')][:2]
     root = ArgumentParser(

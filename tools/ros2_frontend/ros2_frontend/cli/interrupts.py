@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""When Ctrl-C and SIGTERM may interrupt, and when they have to wait a moment."""
+"""Controls when Ctrl-C and SIGTERM interrupt, and when they are deferred."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def keys(enabled: bool = True) -> Iterator[Callable[[], str]]:
     """Read keys without waiting for Enter.
 
     Yields:
-        A function that returns what was typed since it was called last; always nothing unless
-        enabled, or where standard input is no terminal, or belongs to another process group.
+        A function that returns the text typed since its last call; always empty if not enabled, or
+        if standard input is no terminal or belongs to another process group.
     """
     if not enabled or not has_keyboard():
         yield lambda: ''
@@ -57,9 +57,9 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @contextlib.contextmanager
 def signals_interrupt() -> Iterator[None]:
-    """Unwind the stack at SIGINT and SIGTERM, so that no ghost node stays in the graph.
+    """Unwind the stack at SIGINT and SIGTERM, so that no stale node stays in the graph.
 
-    SIGINT, too: a script's shell starts background jobs with SIGINT ignored.
+    SIGINT needs it because a script's shell starts background jobs with SIGINT ignored.
     """
     with _handling(signal.default_int_handler):
         yield
@@ -67,10 +67,10 @@ def signals_interrupt() -> Iterator[None]:
 
 @contextlib.contextmanager
 def deferred_interrupts() -> Iterator[None]:
-    """Keep an interrupt for the end of the block; a second one in the block is not kept.
+    """Defer an interrupt to the end of the block; a second one acts at once.
 
-    An executor that is interrupted in the midst of a callback never runs another one of the same
-    group, and `action send_goal` could not cancel its goal any more.
+    An executor that is interrupted during a callback never runs another one of the same group, so
+    `action send_goal` could no longer cancel its goal.
 
     Raises:
         KeyboardInterrupt: At the end of the block.

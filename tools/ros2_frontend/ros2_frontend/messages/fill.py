@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From YAML values to a message; the generated classes refuse what does not fit.
+"""Converts YAML values to messages; the generated classes reject values that do not fit.
 
-Their checks are off unless asked for, and a wrong type would end in a crash when the message is
-sent. Unlike ros2cli, which calls the Python type on whatever comes, nothing is converted that
-loses something: `3.7` is no integer and `'false'` no bool.
+Their checks are off by default, and a wrong type would crash when the message is sent. Unlike
+ros2cli, which calls the Python type on any value, it never converts with a loss: `3.7` is no
+integer and `'false'` no bool.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ESCAPES = ('\\U', '\\N')
 
 @dataclass(frozen=True, slots=True)
 class Abbreviation:
-    """What to leave out of a message."""
+    """Options that shorten the text of a message."""
 
     length: int | None = None  # longest array or text that is shown in full; None shows all
     no_arrays: bool = False  # whether arrays are replaced by their type and length
@@ -74,12 +74,12 @@ def is_array(value: object) -> bool:
 
 
 def describe_text(value: str) -> str:
-    """Return the stand-in for a text that is left out."""
+    """Return the placeholder for an omitted text."""
     return f'<string length: <{len(value)}>>'
 
 
 def describe_array(value: Any, slot: Any) -> str:  # noqa: ANN401  # of any type
-    """Return the stand-in for an array that is left out; the slot is of its `SLOT_TYPES`."""
+    """Return the placeholder for an omitted array; `slot` is its entry of `SLOT_TYPES`."""
     element = _type_name(slot.value_type)
     if hasattr(slot, 'size'):
         return f'<array type: {element}[{slot.size}]>'
@@ -154,10 +154,11 @@ _SEPARATOR = '.'
 
 
 def parse_mapping(text: str) -> dict[str, Any]:
-    """Read YAML that gives values by name, e.g. `{ target: 10.0 }`; an empty text is none.
+    """Read a YAML mapping, e.g. `{ target: 10.0 }`; an empty text is an empty mapping.
 
     Raises:
-        FieldValueError: It is no YAML, or something else. `target:10.0` is the usual slip.
+        FieldValueError: The text is no YAML mapping; `target:10.0` (no blank) is the usual
+            mistake.
     """
     import yaml
 
@@ -177,16 +178,16 @@ def parse_mapping(text: str) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Filler:
-    """Fills messages and remembers the time stamps that were left to the moment of sending."""
+    """Fills messages, and records the time stamps to set at the time of sending."""
 
     expand_now: bool = False  # whether `header: auto` and `stamp: now` mean the time of sending
     # one setter for each such stamp; call it with a `builtin_interfaces/msg/Time`
     stamps: list[Callable[[Message], None]] = field(default_factory=list)
 
     def fill(self, message: Message, values: object, path: str = '') -> None:
-        """Set the fields of a message that `values`, a mapping or None, names.
+        """Set the fields of a message that the mapping `values` names; None sets none.
 
-        `path` is where the message stands in a larger one, for error messages.
+        `path` is the position of the message in a larger one, for error messages.
         """
         values = {} if values is None else values
         kind, fields = type(message).__name__, message.get_fields_and_field_types()
@@ -240,7 +241,7 @@ def _namespaced(slot: Any) -> tuple[str, ...]:  # noqa: ANN401  # of rosidl_pars
 
 
 def _converted(slot: Any, value: object) -> object:  # noqa: ANN401  # of rosidl_parser
-    """Convert what YAML reads as another type, where nothing is lost; else leave it as it is."""
+    """Convert a value of another YAML type if that loses nothing, else return it unchanged."""
     kind = getattr(slot, 'typename', None)
     if kind is None:
         if isinstance(value, bytes):
@@ -283,7 +284,7 @@ def filled(
 
 
 def dump(node: str, values: Mapping[str, object]) -> str:
-    """Write a parameter file for one node, keys sorted; a point in a name starts a level."""
+    """Return a parameter file for one node, keys sorted; a dot in a name starts a level."""
     import yaml
 
     tree: dict[str, Any] = {}
@@ -298,10 +299,10 @@ def dump(node: str, values: Mapping[str, object]) -> str:
 
 
 def values_for(node: str, text: str, *, use_wildcard: bool = True) -> dict[str, object]:
-    """Read the parameters of one node, and perhaps those for all (`/**`), in a parameter file.
+    """Read the parameters of one node, and by default those for all (`/**`), from a file's text.
 
-    What names the node goes before what is for all nodes. (rclpy's reader takes a quoted '5' for
-    a number.)
+    Entries of the node override those for all nodes. (rclpy's reader parses a quoted '5' as a
+    number.)
 
     Raises:
         UnknownNameError: The file has nothing for the node.

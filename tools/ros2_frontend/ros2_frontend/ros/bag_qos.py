@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""QoS of recordings: what was offered, what fits all publishers, what is offered again."""
+"""QoS of recordings: offered profiles, a profile for all publishers, profiles for playing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _COMMON = ('reliability', 'durability', 'deadline', 'lifespan')
 
 
 def offered(profile: Handle) -> OfferedQos:
-    """Write down what a publisher offers."""
+    """Convert the rclpy profile of a publisher to `OfferedQos`."""
     policies = {name: getattr(profile, name).name.lower() for name in _POLICIES}
     durations = {name: getattr(profile, name).nanoseconds for name in _DURATIONS}
     conventions = profile.avoid_ros_namespace_conventions
@@ -31,7 +31,7 @@ def offered(profile: Handle) -> OfferedQos:
 
 
 def to_profile(qos: OfferedQos) -> Handle:
-    """Make a profile of rclpy."""
+    """Convert to a profile of rclpy."""
     from rclpy import qos as rclpy_qos
     from rclpy.duration import Duration
 
@@ -51,7 +51,7 @@ def to_profile(qos: OfferedQos) -> Handle:
 
 
 def for_recording(publishers: Sequence[OfferedQos]) -> OfferedQos:
-    """What connects to all publishers, and gets what they kept where all of them keep."""
+    """Return a profile that matches all publishers; transient local if all of them are."""
     reliable = all(each.reliability == 'reliable' for each in publishers)
     latched = all(each.durability == 'transient_local' for each in publishers)
     return OfferedQos(
@@ -63,7 +63,7 @@ def for_recording(publishers: Sequence[OfferedQos]) -> OfferedQos:
 
 
 def for_playing(publishers: Sequence[OfferedQos]) -> OfferedQos:
-    """What the publishers of a recording offered, where they agreed; else the default."""
+    """Return the policies that all publishers of a recording share, with defaults for the rest."""
     default = OfferedQos('keep_last', PLAY_DEPTH)
     if not publishers:
         return default
@@ -78,14 +78,14 @@ def for_playing(publishers: Sequence[OfferedQos]) -> OfferedQos:
 
 
 def overridden(qos: OfferedQos, depth: int) -> OfferedQos:
-    """A profile of a file with overrides, with the history that a file may leave out."""
+    """Return a profile of an overrides file, completed by the history that it may omit."""
     if qos.history in {'unknown', 'system_default'}:
         return replace(qos, history='keep_last', depth=qos.depth or depth)
     return qos
 
 
 def is_compatible(requested: OfferedQos, publisher: OfferedQos) -> bool:
-    """Whether a subscription gets what a publisher sends."""
+    """Return whether a subscription is compatible with a publisher."""
     if requested.reliability == 'reliable' and publisher.reliability == 'best_effort':
         return False
     return not (requested.durability == 'transient_local' and publisher.durability == 'volatile')

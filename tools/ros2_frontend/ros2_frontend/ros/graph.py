@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS graph as one node sees it, and waiting for it.
+"""The ROS graph as one node sees it, and how commands wait for discovery.
 
 There is no daemon: each command joins the graph anew, and waits as long as ros2cli without its
-daemon does. Then all nodes of this host are known, because their profile (`dds_network`) makes
-them announce themselves often. A list waits longer while a participant of this host is not known
-as one of ROS: on a busy machine a node is late, and DDS of another vendor answers in up to 0.8 s.
-A command that wants a name goes on as soon as the name is there, and waits a little longer for
-one that is not.
+daemon. By then all nodes of this host are known, because their profile (`dds_network`) makes them
+announce themselves often. A list waits longer while a participant of this host is not yet
+identified as ROS: nodes are late on a busy machine, and DDS of another vendor takes up to 0.8 s. A
+command for one name continues as soon as that appears, and waits a little longer if it does not.
 """
 
 from __future__ import annotations
@@ -43,10 +42,10 @@ _LONGEST_WAIT = 0.1  # [s]
 class Session:
     """One ROS context with one hidden node, for the life of one command.
 
-    The signal handlers of rclpy stay out: a command ends by `KeyboardInterrupt`, with a context
-    that still works (`action send_goal` cancels its goal then), and always takes its participant
-    out of the graph. Executor: `SingleThreadedExecutor`; the multi-threaded one hands callbacks
-    out repeatedly, and the unbounded spin of the events executor burns a core (rclpy 7.1.6).
+    It does not install rclpy's signal handlers: a command ends by `KeyboardInterrupt`, with a
+    context that still works (so `action send_goal` can cancel its goal), and always removes its
+    participant from the graph. Executor: `SingleThreadedExecutor`; the multi-threaded one runs
+    callbacks repeatedly, and the unbounded spin of the events executor burns a core (rclpy 7.1.6).
     """
 
     def __init__(self, node: Handle, executor: Handle) -> None:
@@ -59,7 +58,7 @@ class Session:
             self._executor.spin_once(timeout_sec=min(timeout, _LONGEST_WAIT))
 
     def spin_until(self, done: Callable[[], bool], timeout: float | None = None) -> bool:
-        """Serve callbacks until a condition holds; return False when `timeout` [s] passes."""
+        """Run callbacks until a condition holds; return False after `timeout` in [s]."""
         deadline = None if timeout is None else time.monotonic() + timeout
         while not done():
             left = _LONGEST_WAIT if deadline is None else deadline - time.monotonic()
@@ -69,16 +68,16 @@ class Session:
         return True
 
     def spin(self) -> None:
-        """Serve callbacks until Ctrl-C."""
+        """Run callbacks until Ctrl-C."""
         while True:
             self.spin_once()
 
 
 @contextlib.contextmanager
 def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Session]:
-    """Join the ROS graph for one command, by a node that is gone from it afterwards.
+    """Join the ROS graph for one command with a node that leaves it afterwards.
 
-    Without a name it is a hidden one.
+    Without a name, the node is hidden.
 
     Raises:
         FrontendError: The node's name, or another that the session uses, is malformed.
@@ -145,10 +144,10 @@ _TIMEOUT = 5.0  # [s] for a service of a node that exists to show up, and to ans
 
 
 class Graph:
-    """What is in the ROS graph."""
+    """Contents of the ROS graph."""
 
     def __init__(self, session: Session, spin_time: float | None = None) -> None:
-        """Start to look; discovery takes `spin_time` in [s], None for the default."""
+        """Start discovery, which takes `spin_time` in [s]; None for the default."""
         self.session = session  # the session that looks; its node is part of the graph
         self._node = session.node
         fast = spin_time is None and is_this_host(os.environ)
@@ -159,7 +158,7 @@ class Graph:
         self._missing = begin + (_NAME_TIME if fast else longest)
 
     def nodes(self, hidden: bool = False) -> list[NodeName]:
-        """Return the nodes, as often as they occur, in no order."""
+        """Return the nodes, unordered, with duplicates."""
         names = [NodeName.of(*pair) for pair in self._node.get_node_names_and_namespaces()]
         return [name for name in names if hidden or not name.hidden]
 
@@ -168,11 +167,11 @@ class Graph:
         return _visible(self._node.get_topic_names_and_types(), hidden)
 
     def services(self, hidden: bool = False) -> NamesAndTypes:
-        """Return the services and their types, sorted by name; those with clients alone, too."""
+        """Return the services and types, sorted by name, even those that have only clients."""
         return _visible(self._node.get_service_names_and_types(), hidden)
 
     def offered_services(self) -> dict[str, list[str]]:
-        """Return the types of the services that some node offers, by name."""
+        """Return the types, by name, of the services that have a server."""
         from rclpy.node import NodeNameNonExistentError
 
         found: dict[str, list[str]] = {}
@@ -191,7 +190,7 @@ class Graph:
         return list(self._node.get_subscriptions_info_by_topic(topic))
 
     def settle(self, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Wait until the time for discovery has passed; longer for a participant not yet known."""
+        """Wait until the discovery time has passed; longer for an unidentified participant."""
         _wait(meanwhile, self._complete)
         _wait(lambda: self._knows_this_host() or None, self._late)
 
@@ -203,11 +202,11 @@ class Graph:
         return len(self.nodes(hidden=True)) >= len(known) >= participants
 
     def wait_for(self, look: Callable[[], T | None], timeout: float = math.inf) -> T | None:
-        """Return what `look` finds; None when it is missing for sure, or after `timeout` [s]."""
+        """Return the result of `look`; None if surely missing, or after `timeout` in [s]."""
         return _wait(look, min(self._missing, time.monotonic() + timeout))
 
     def wait_until(self, look: Callable[[], T | None], timeout: float | None = None) -> T | None:
-        """Return what `look` finds, however long it takes; None only after `timeout` [s]."""
+        """Return the result of `look`, without limit; None only after `timeout` in [s]."""
         return _wait(look, time.monotonic() + (math.inf if timeout is None else timeout))
 
 
@@ -224,13 +223,13 @@ def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:
 
 @contextlib.contextmanager
 def open_graph(args: Namespace) -> Iterator[Graph]:
-    """Join the ROS graph for one command with parsed `GRAPH_ARGUMENTS`, and look at it."""
+    """Join the ROS graph for one command with parsed `GRAPH_ARGUMENTS`, and discover it."""
     with open_session(args) as session:
         yield Graph(session, args.spin_time)
 
 
 def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], int | None]], Verb]:
-    """Make a verb of a function that looks at the ROS graph; it gets `GRAPH_ARGUMENTS`, too."""
+    """Decorate a function that reads the ROS graph as a verb, with `GRAPH_ARGUMENTS` added."""
 
     def declare(run: Callable[[Graph, Namespace], int | None]) -> Verb:
         def main(args: Namespace) -> int | None:
@@ -248,7 +247,7 @@ def request(
     """Call a service by a client of rclpy and return the response.
 
     Raises:
-        NoAnswerError: None came in `timeout` [s].
+        NoAnswerError: No response arrived in `timeout` in [s].
         FrontendError: The answer cannot be read.
     """
     future = client.call_async(request_)
@@ -281,12 +280,12 @@ def action_names(graph: Graph) -> NamesAndTypes:
 
 
 def offered_actions(graph: Graph) -> set[str]:
-    """Return the actions that have a server; `action_names` has those with clients alone, too."""
+    """Return the actions that have a server; `action_names` includes those with only clients."""
     return {name for name, _ in action_names(graph) if clients_and_servers(graph, name)[1]}
 
 
 def clients_and_servers(graph: Graph, action: str) -> tuple[NamesAndTypes, NamesAndTypes]:
-    """Return the nodes that use and that offer an action, with the types they use it with."""
+    """Return the client nodes and the server nodes of an action, with their types."""
     from rclpy.action.graph import (
         get_action_client_names_and_types_by_node,
         get_action_server_names_and_types_by_node,

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joins the ROS graph before a command is parsed, and before most of rclpy is loaded.
+"""Joins the ROS graph before the command is parsed and most of rclpy is loaded.
 
-Discovery takes a tenth of a second and more, in threads of DDS: what Python loads meanwhile costs
-no time. The participant is there with its first node, which goes when the session has its own.
+Discovery takes 0.1 s or more in threads of DDS, so Python's imports meanwhile cost no time. The
+participant exists with its first node, which is removed when the session has its own.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _joined: list[tuple[Handle, Handle]] = []  # context and node, until a session t
 
 @contextlib.contextmanager
 def joined_early(words: Sequence[str]) -> Iterator[None]:
-    """Join for a command that will; leave at the end of the block unless a session did join.
+    """Join for a command that will need it; leave after the block unless a session took over.
 
-    Only where env.sh keeps DDS to this host: to find out what else is wanted takes its time.
+    Only if env.sh restricts DDS to this host: to determine another reach takes time.
     """
     group, *verb = [word for word in words if not word.startswith('-')] or ['']
     if (
@@ -60,7 +60,7 @@ def joined_early(words: Sequence[str]) -> Iterator[None]:
 
 
 def _join() -> tuple[Handle, Handle]:
-    """Make context and node by the extension of rclpy alone, whose package takes twice as long."""
+    """Create context and node by rclpy's extension alone, in half the time of the package."""
     package = find_spec('rclpy')
     folders = package.submodule_search_locations if package else None
     spec = PathFinder.find_spec(_EXTENSION, folders)
@@ -76,10 +76,10 @@ def _join() -> tuple[Handle, Handle]:
 
 @contextlib.contextmanager
 def early_context(extension: Handle) -> Iterator[Callable[[], None]]:
-    """Let rclpy.init take the context that has joined, if one has.
+    """Make rclpy.init reuse the context that has already joined, if there is one.
 
     Yields:
-        What ends the node by which it joined, when there is another one.
+        A function that destroys the node that joined, once there is another.
     """
     if not _joined:
         yield lambda: None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""QoS options of `topic echo`, `hz`, `pub`, and the choice that fits the publishers."""
+"""QoS options of `topic echo`, `hz`, `pub`, and a profile that matches the publishers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _policy(name: str) -> Handle:
 
 
 def _preset(key: str) -> Handle:
-    """Return a profile of its own: a preset is shared by the whole process."""
+    """Return a copy of a preset, which the whole process shares."""
     from rclpy.qos import QoSPresetProfiles, QoSProfile
 
     preset = QoSPresetProfiles.get_from_short_key(key)
@@ -36,7 +36,7 @@ def _preset(key: str) -> Handle:
 
 
 def add_qos_arguments(parser: Any, verb: str, preset: str) -> None:  # noqa: ANN401  # argparse's
-    """Add the QoS options of a verb that does `subscribe` or `publish` with a preset."""
+    """Add the QoS options of a verb; `verb` is `subscribe` or `publish`, for the help."""
     from rclpy.qos import QoSPresetProfiles
 
     default = _preset(preset)
@@ -101,10 +101,10 @@ def profile_of(args: Namespace) -> Handle:
 def matching_profile(
     args: Namespace, graph: Graph, topic: str, report: Callable[[str], None]
 ) -> Handle:
-    """Return the profile that connects to all publishers of a topic, unless the options name one.
+    """Return a profile that matches all publishers of a topic, unless the options name one.
 
-    Reliable when all publishers are, transient local when all are; else what connects to all,
-    which is reported.
+    Reliable if all publishers are, transient local if all are; else one that matches all, which is
+    reported.
     """
     profile = profile_of(args)
     publishers = [info.qos_profile for info in graph.publishers(topic)]

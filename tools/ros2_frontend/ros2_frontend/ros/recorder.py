@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Records topics: subscribes to what appears, and hands bytes to a thread that writes.
+"""Records topics: subscribes to topics as they appear, and passes bytes to a writer thread.
 
-Messages are taken from DDS as bytes, without an executor: a wait set over a hundred topics costs
-far more than asking each of them fifty times a second, and the events executor of rclpy 7.1.6
-does not serve such subscriptions. What waits in DDS has the time at which it arrived.
+It takes messages from DDS as bytes, without an executor: a wait set over 100 topics costs far more
+than polling each at 50 Hz, and the events executor of rclpy 7.1.6 does not support such
+subscriptions. Messages that wait in DDS keep their time of arrival.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FLUSH_PERIOD = 1.0  # [s]; what a SIGKILL may cost
 
 
 class Recorder:
-    """Records into a writer until it is stopped. What cannot be written is a FrontendError."""
+    """Records into a writer until stopped. A failed write raises a FrontendError."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Recorder:
         overrides: Mapping[str, OfferedQos],
         args: Namespace,
     ) -> None:
-        """Subscribe to nothing yet."""
+        """Prepare without subscriptions."""
         # whether messages are dropped at the moment, because the user wants that
         self.paused = False
         self._graph = graph
@@ -61,7 +61,7 @@ class Recorder:
         self._clock = self._subscribe_clock() if args.sim_time else None
 
     def run(self, poll: Callable[[], None]) -> None:
-        """Record until an exception, which is how Ctrl-C arrives; poll between two rounds."""
+        """Record until an exception, such as Ctrl-C; call `poll` between two rounds."""
         self._graph.settle(lambda: self._round(discovery=True))
         self._log.info('All requested topics are subscribed. Recording...')
         while True:
@@ -70,7 +70,7 @@ class Recorder:
             time.sleep(_TAKE_PERIOD)
 
     def stop(self) -> None:
-        """Write what has arrived, and report what was lost."""
+        """Write messages that have arrived, and report lost ones."""
         try:
             self._take()
             self._confirm()
@@ -90,7 +90,7 @@ class Recorder:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many messages of each topic were written."""
+        """Number of written messages by topic."""
         return self._queue.written
 
     def _round(self, discovery: bool) -> None:
@@ -153,7 +153,7 @@ class Recorder:
         self._log.warning(reason)
 
     def _confirm(self) -> None:
-        """Compare the publishers with those of the last look."""
+        """Compare the publishers with those of the previous check."""
         for name, each in self._topics.items():
             endpoints = self._graph.publishers(name)
             each.confirm({bytes(end.endpoint_gid) for end in endpoints})
@@ -196,10 +196,10 @@ class Recorder:
 
 @dataclass(slots=True)
 class _Subscribed:
-    """A topic that is recorded, and how many of its messages were lost on their way.
+    """A recorded topic, and its number of lost messages.
 
-    A message does not say who published it. So its number is compared with that of the last one
-    only as long as the same single publisher is in the graph before and after.
+    A message does not identify its publisher. So sequence numbers are compared only while the same
+    single publisher is in the graph before and after.
     """
 
     topic: Topic
@@ -212,13 +212,13 @@ class _Subscribed:
     publishers: AbstractSet[bytes] = frozenset()
 
     def receive(self, sequence: int | None) -> None:
-        """Process the number of a message; None where the middleware has none."""
+        """Process the sequence number of a message; None if the middleware has none."""
         if sequence is not None and self.last is not None:
             self.gap += max(sequence - self.last - 1, 0)
         self.last = sequence
 
     def confirm(self, publishers: AbstractSet[bytes]) -> None:
-        """Count what was missing since the last time, by who publishes now."""
+        """Count messages lost since the last call, given the present publishers."""
         if len(publishers) == 1 and publishers == self.publishers:
             self.lost += self.gap
         else:
@@ -229,7 +229,7 @@ class _Subscribed:
 def _taken(
     subscription: Handle, raw: bool = True
 ) -> Iterator[tuple[Handle, Mapping[str, int | None]]]:
-    """Yield what waits, with its times and number."""
+    """Yield waiting messages, each with its times and sequence number."""
     handle = subscription.handle
     with handle:
         while (taken := handle.take_message(subscription.msg_type, raw)) is not None:
@@ -237,7 +237,7 @@ def _taken(
 
 
 class _WriterThread:
-    """Writes on a thread of its own: a disk that stalls must not make DDS drop messages."""
+    """Writes in its own thread, so that a stalled disk does not make DDS drop messages."""
 
     def __init__(self, writer: BagWriter, max_bytes: int) -> None:
         self.written: Counter[str] = Counter()  # how many messages of each topic were handed over
@@ -269,12 +269,12 @@ class _WriterThread:
         self._jobs.append((self._writer.write, job, size))
 
     def check(self) -> None:
-        """Raise what the thread met."""
+        """Raise the exception of the thread, if any."""
         if self._error is not None:
             raise FrontendError(str(self._error))
 
     def close(self) -> None:
-        """Write what waits and finish the recording."""
+        """Write queued messages and finish the recording."""
         self._closing.set()
         self._thread.join()
         self.check()
@@ -302,4 +302,4 @@ class _WriterThread:
 
 
 def _not_called(_: object) -> None:
-    """Stand for the callback of a subscription that no executor serves."""
+    """Serve as callback of a subscription that no executor runs."""

@@ -26,7 +26,7 @@ def list_names(graph: Graph, args: Namespace) -> None:
     flag('-c', '--count', help='Only display the number of action clients and action servers'),
 )
 def info(graph: Graph, args: Namespace) -> None:
-    """Print who offers and who uses the action; none is no error, as in ros2cli."""
+    """Print the clients and servers of the action; none is no error, as in ros2cli."""
     name = absolute(args.action_name)
     graph.wait_for(lambda: dict(action_names(graph)).get(name))
     graph.settle()

@@ -21,7 +21,7 @@ _BAG = argument('bag_path', help='Bag to open')
 
 
 def info_text(metadata: BagMetadata, size: int) -> str:
-    """Return the text for a recording whose files have a size in [byte]."""
+    """Return the text of `info` for a recording with a total size in [byte]."""
     topics = [
         f'Topic: {each.topic.name} | Type: {each.topic.type} | Count: {each.count} | '
         f'Serialization Format: {each.topic.serialization}'
@@ -45,7 +45,7 @@ def info_text(metadata: BagMetadata, size: int) -> str:
 
 
 def size_text(size: int) -> str:
-    """Return a size in [byte] in the unit that suits it."""
+    """Format a size in [byte] with a suitable unit."""
     value, unit = float(size), 0
     while value >= 1024 and unit < len(_UNITS) - 1:
         value, unit = value / 1024, unit + 1
@@ -69,7 +69,7 @@ def _moment(nanoseconds: int) -> str:
 
 @verb(_BAG, STORAGE, flag('-t', '--topic-name', help='Only display topic names.'))
 def info(args: Namespace) -> None:
-    """Print what a recording has."""
+    """Print the summary of a recording."""
     reader = open_bag(args.bag_path)
     if args.topic_name:
         print(*sorted(each.topic.name for each in reader.metadata.topics), sep='\n')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording: its bytes are published as they are, at the times at which they arrived."""
+"""Plays a recording: publishes its bytes unchanged, at their times of arrival."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ _COURSE = (
     *_COURSE,
 )
 def play(args: Namespace) -> None:
-    """Publish what was recorded."""
+    """Publish the messages of a recording."""
     reader = open_bag(args.bag_path)
     accepts = topic_filter(args, not (args.topics or args.regex), hidden=True)
     recorded = reader.metadata
@@ -156,7 +156,7 @@ _POLL = 0.02  # [s] between two looks at the keyboard
 
 @dataclass(slots=True)
 class PlayClock:
-    """Which moment of a recording is due."""
+    """Clock of a playback, with pause."""
 
     rate: float  # how many times faster than it was recorded
     paused: bool = False  # whether it stands still
@@ -164,25 +164,25 @@ class PlayClock:
     _since: float | None = None  # None before the start, and while it stands still
 
     def start(self, moment: int) -> None:
-        """Begin at a moment of the recording in [ns]."""
+        """Start at a time of the recording in [ns]."""
         self._moment = float(moment)
         self._since = None if self.paused else time.monotonic()
 
     def moment(self) -> int:
-        """The moment in [ns]."""
+        """Current time of the recording in [ns]."""
         elapsed = 0.0 if self._since is None else time.monotonic() - self._since
         return int(self._moment + elapsed * self.rate * _NANO)
 
     def wait_for(self, moment: int) -> float:
-        """Time until a moment in [s]; a while where it stands still."""
+        """Return the wait in [s] until a time of the recording; a short one while paused."""
         return _POLL if self.paused else (moment - self.moment()) / (self.rate * _NANO)
 
     def step(self, moment: int) -> None:
-        """Go to a moment in [ns] while it stands still."""
+        """Advance to a time in [ns] while paused."""
         self._moment = float(moment)
 
     def toggle(self) -> None:
-        """Stand still, or go on."""
+        """Pause or resume."""
         moment = self.moment()
         self.paused = not self.paused
         self.start(moment)
@@ -199,7 +199,7 @@ class Player:
         overrides: Mapping[str, OfferedQos],
         remaps: Mapping[str, str],
     ) -> None:
-        """Make the publishers of topics, with QoS and names by recorded topic where given."""
+        """Create the publishers; QoS overrides and new names are keyed by recorded topic."""
         self.clock = clock  # which moment is due
         self._node = session.node
         self._publishers: dict[str, Handle] = {}
@@ -232,7 +232,7 @@ class Player:
         return count
 
     def finish(self) -> None:
-        """Wait until subscriptions have the last messages: they are lost with their publisher."""
+        """Wait until subscriptions have the last messages; the publishers' end would lose them."""
         from rclpy.duration import Duration  # rclpy is imported by the session
 
         deadline = time.monotonic() + ACK_TIMEOUT

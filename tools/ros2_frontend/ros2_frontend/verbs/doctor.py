@@ -17,7 +17,7 @@ from ..names import Handle
 from ..ros.graph import Graph, graph_verb
 
 Finding = tuple[bool, str]
-"""Whether it is an error, not a warning; what may be wrong, and what to do about it."""
+"""Whether it is an error or a warning; the possible problem and its remedy."""
 Rows = list[tuple[str, object]]
 
 _ALWAYS_THERE = ('/parameter_events', '/rosout')
@@ -73,7 +73,7 @@ def doctor(graph: Graph, args: Namespace) -> None:
 
 
 def check_environment(environ: Mapping[str, str]) -> Iterator[Finding]:
-    """Check the variables that decide which node finds which."""
+    """Check the environment variables that affect discovery."""
     if (distro := environ.get('ROS_DISTRO', '')) != 'jazzy':
         yield False, f"ROS_DISTRO is '{distro}', not jazzy; source env.sh in this shell."
     domain = environ.get('ROS_DOMAIN_ID', '') or '0'

@@ -28,7 +28,7 @@ def _lifecycle_nodes(graph: Graph, hidden: bool) -> list[NodeName]:
 
 @graph_verb(*LIST_ARGUMENTS)
 def nodes(graph: Graph, args: Namespace) -> None:
-    """Print the nodes with a lifecycle."""
+    """Print the lifecycle nodes."""
     graph.settle()
     found = _lifecycle_nodes(graph, args.all)
     for line in [len(found)] if args.count_nodes else [node.full_name for node in found]:
@@ -37,7 +37,7 @@ def nodes(graph: Graph, args: Namespace) -> None:
 
 @graph_verb(*OPTIONAL_NODE)
 def get(graph: Graph, args: Namespace) -> None:
-    """Print the state of one node, or of all that have one."""
+    """Print the state of one node, or of all lifecycle nodes."""
     if args.node_name:
         node = find_node(args.node_name, graph, args.include_hidden_nodes)
         print(_state(graph, node))
@@ -57,7 +57,7 @@ def _state(graph: Graph, node: NodeName) -> str:
 
 @node_verb(flag('-a', '--all', help='Display all existing transitions'))
 def list_transitions(graph: Graph, node: NodeName, args: Namespace) -> None:
-    """Print the transitions that the node can make now, or all of its state machine."""
+    """Print the transitions available in the node's current state, or all transitions."""
     query = 'get_transition_graph' if args.all else 'get_available_transitions'
     for entry in _transitions(graph, node, query):
         print(f'- {entry.transition.label} [{entry.transition.id}]')
@@ -74,7 +74,7 @@ def _transitions(
 
 @node_verb(argument('transition', help='The lifecycle transition'))
 def set_state(graph: Graph, node: NodeName, args: Namespace) -> None:
-    """Make the node go through a transition, named by label or number."""
+    """Trigger a transition of the node, by label or number."""
     found = [entry.transition for entry in _transitions(graph, node)]
     wanted = [t for t in found if args.transition in {t.label, str(t.id)}]
     if not wanted:

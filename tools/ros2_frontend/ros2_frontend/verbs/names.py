@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the verbs of topics, services and actions share: they list, find and type names."""
+"""Shared verbs of topics, services and actions: `list`, `find`, `type`, `info`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Names:
     read: Callable[[Graph, bool], NamesAndTypes]
 
     def list_arguments(self, types: bool = True, hidden: bool = True) -> tuple[Argument, ...]:
-        """Return the switches of `list`, and of `find`, which shows no types."""
+        """Return the switches of `list` or, with `types` off, of `find`."""
         count = f'Only display the number of {self.kind}s discovered'
         found = [flag('-c', f'--count-{self.kind}s', dest='count', help=count)]
         if types:
@@ -35,26 +35,26 @@ class Names:
         return tuple(found)
 
     def types_flag(self) -> Argument:
-        """Return the switch that shows types, too."""
+        """Return the switch that also shows types."""
         return flag('-t', '--show-types', help=f'Additionally show the {self.kind} type')
 
     def name_argument(self, purpose: str, example: str) -> Argument:
-        """Return the name that the verb is about, with an example for the help."""
+        """Return the argument for the name, with an example for the help."""
         text = f"Name of the ROS {self.kind} to {purpose} (e.g. '{example}')"
         return argument(f'{self.kind}_name', help=text)
 
     def type_argument(self, example: str) -> Argument:
-        """Return the type that is looked for, with an example for the help."""
+        """Return the argument for the wanted type, with an example for the help."""
         text = f"Name of the ROS {self.kind} type to filter for (e.g. '{example}')"
         return argument(f'{self.kind}_type', help=text)
 
     def shown(self, graph: Graph, args: Namespace) -> NamesAndTypes:
-        """Wait for the whole graph, and return the names that the options let pass."""
+        """Wait for the whole graph, and return the names that the options select."""
         graph.settle()
         return self.read(graph, self._hidden(args))
 
     def print_list(self, graph: Graph, args: Namespace) -> None:
-        """Do `list`."""
+        """Execute `list`."""
         pairs = self.shown(graph, args)
         _print(
             [f'{name} [{", ".join(types)}]' if args.show_types else name for name, types in pairs],
@@ -62,12 +62,12 @@ class Names:
         )
 
     def print_found(self, graph: Graph, args: Namespace) -> None:
-        """Do `find`."""
+        """Execute `find`."""
         wanted = getattr(args, f'{self.kind}_type')
         _print([name for name, types in self.shown(graph, args) if wanted in types], args)
 
     def print_type(self, graph: Graph, args: Namespace) -> int:
-        """Do `type`: one per line. Exit code 1 when there is no such name, as in ros2cli."""
+        """Print the types, one per line. Exit code 1 when there is no such name, as in ros2cli."""
         name = getattr(args, f'{self.kind}_name')
         try:
             types = self._types_of(name, graph, f"Unknown name '{name}'", self._hidden(args))
@@ -78,7 +78,7 @@ class Names:
         return 0
 
     def print_info_type(self, graph: Graph, args: Namespace, end: str = '\n') -> str:
-        """Do the first line of `info`, when the whole graph is there; return the absolute name."""
+        """Print the first line of `info` after discovery; return the absolute name."""
         name = getattr(args, f'{self.kind}_name')
         types = self._types_of(name, graph, f"Unknown {self.kind} '{name}'")
         graph.settle()

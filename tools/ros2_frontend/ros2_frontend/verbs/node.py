@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""`ros2 node list` and `info`, and the node that a `param` or `lifecycle` command is about."""
+"""`ros2 node list` and `info`, and the lookup of nodes for `param` and `lifecycle`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..ros.graph import Graph, graph_verb
 HIDDEN_NODES = flag('--include-hidden-nodes', help='Consider hidden nodes as well')
 NODE = (argument('node_name', help='Name of the ROS node'), HIDDEN_NODES)
 OPTIONAL_NODE = (argument('node_name', nargs='?', help='Name of the ROS node'), HIDDEN_NODES)
-"""Without a name, all nodes are meant."""
+"""Without a name, the command applies to all nodes."""
 
 NodeMain = Callable[[Graph, NodeName, Namespace], 'int | None']
 
@@ -26,7 +26,7 @@ LIST_ARGUMENTS = (
 
 
 def node_verb(*arguments: Argument) -> Callable[[NodeMain], Verb]:
-    """Make a verb of a function that talks to one node; it gets the node's name, too."""
+    """Decorate a function for one node as a verb; it also gets the node's name."""
 
     def declare(run: NodeMain) -> Verb:
         @graph_verb(*NODE, *arguments)
@@ -43,7 +43,7 @@ def find_node(name: str, graph: Graph, hidden: bool, message: str = 'Node not fo
     """Wait for a node, by its name as typed.
 
     Raises:
-        UnknownNameError: With the message, when it does not appear; it names the nearest.
+        UnknownNameError: The node does not appear; the error is `message` with the nearest name.
     """
     wanted = NodeName.parse(name)
     if not graph.wait_for(lambda: wanted in graph.nodes(hidden) or None):
@@ -75,7 +75,7 @@ def list_names(graph: Graph, args: Namespace) -> None:
     flag('--include-hidden', help='Display hidden topics, services, and actions as well'),
 )
 def info(graph: Graph, args: Namespace) -> None:
-    """Print what the node offers and uses."""
+    """Print the topics, services and actions of the node."""
     from rclpy.action.graph import (
         get_action_client_names_and_types_by_node,
         get_action_server_names_and_types_by_node,

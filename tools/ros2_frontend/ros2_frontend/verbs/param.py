@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""`ros2 param`: the parameters of nodes that run."""
+"""`ros2 param`: parameters of running nodes."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ TYPE_NAMES: Mapping[int, str] = {number: names[1] for number, names in _TYPES.it
 
 
 def labelled(value: Message) -> tuple[str, Any]:
-    """Return what `get` prints before a `ParameterValue`, and its value as the message has it."""
+    """Return the label that `get` prints for a `ParameterValue`, and its value."""
     field, _, label = _TYPES[value.type]
     return label, getattr(value, field) if field else None
 
 
 def parse_value(text: str) -> object:
-    """Return the value that a user means: YAML, or else a text, as a mapping or a date is."""
+    """Parse a value as YAML; anything else, such as a mapping or a date, stays a text."""
     import yaml
 
     try:
@@ -60,7 +60,7 @@ def parse_value(text: str) -> object:
 def parameter(name: str, value: object) -> Message:
     """Make the `rcl_interfaces/msg/Parameter` that sets a parameter; None deletes it.
 
-    A list of integers and floating-point numbers counts as one of the latter.
+    A mixed list of integers and floating-point numbers becomes a list of floats.
 
     Raises:
         FieldValueError: No parameter can have the value.
@@ -82,18 +82,18 @@ def _call(service: str, graph: Graph, node: NodeName, **fields: object) -> Messa
 
 
 def list_names(graph: Graph, node: NodeName, prefixes: Sequence[str] = ()) -> list[str]:
-    """Return the names of a node's parameters, sorted; only those below one of the prefixes."""
+    """Return the sorted parameter names of a node; with prefixes, only those below one."""
     response = _call('list_parameters', graph, node, prefixes=list(prefixes))
     return sorted(response.result.names)
 
 
 def get_values(graph: Graph, node: NodeName, names: Iterable[str]) -> list[Message]:
-    """Return a `ParameterValue` for each name, or none at all when one is not declared."""
+    """Return a `ParameterValue` for each name; an empty list if one is not declared."""
     return list(_call('get_parameters', graph, node, names=list(names)).values)
 
 
 def set_values(graph: Graph, node: NodeName, parameters: Iterable[Message]) -> list[Message]:
-    """Set each `Parameter` by itself; return a `SetParametersResult` for each."""
+    """Set each `Parameter` separately; return a `SetParametersResult` for each."""
     return list(_call('set_parameters', graph, node, parameters=list(parameters)).results)
 
 
@@ -165,7 +165,7 @@ def _report(result: Message, text: str) -> None:
     flag('--param-type', help='Print parameter types with parameter names'),
 )
 def list_all(graph: Graph, args: Namespace) -> None:
-    """Print the names, below their node's when no node is named."""
+    """Print the names; if no node is named, grouped by node."""
     try:
         pattern = re.compile(args.filter or '')
     except re.error as error:
@@ -187,7 +187,7 @@ def list_all(graph: Graph, args: Namespace) -> None:
 
 
 def _nodes(args: Namespace, graph: Graph) -> Sequence[NodeName]:
-    """The named node, or all that offer the service."""
+    """Return the named node, or all nodes that offer the service."""
     if args.node_name:
         return [find_node(args.node_name, graph, args.include_hidden_nodes)]
     graph.settle()

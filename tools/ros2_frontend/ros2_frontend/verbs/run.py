@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""`ros2 run`: become an executable of a package.
+"""`ros2 run`: replace this process by an executable of a package.
 
-This process is replaced by the executable. So every signal reaches it, once, wherever it comes
-from; its exit code is ours; and there is one process less per node. (ros2cli keeps a parent,
-which leaves the node running when only the parent is killed.)
+So the executable gets every signal exactly once, from any sender; its exit code is ours; and there
+is one process less per node. (ros2cli keeps a parent, which leaves the node running when only the
+parent is killed.)
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def run(args: Namespace) -> NoReturn:
     argument('launch_arguments', nargs=REMAINDER, help='Arguments to the launch file'),
 )
 def launch(args: Namespace) -> NoReturn:
-    """Name the executables of the package; the one with the name of the launch file, if any."""
+    """Print the executables of the package, or the one named like the launch file."""
     package = args.package_name
     names = sorted(path.name for path in executables(package))
     wanted = args.launch_file_name.partition('.')[0]

@@ -90,7 +90,7 @@ def _result_of(future: Handle, session: Session) -> Handle:
 
 
 def _cancel(sent: Handle, session: Session) -> None:
-    """Cancel the goal; one that is just being sent may be accepted yet."""
+    """Cancel the goal, even one that is still being sent and may be accepted later."""
     if not session.spin_until(sent.done, _CANCEL_TIMEOUT):
         raise FrontendError('Failed to cancel goal: it is not known whether it was accepted')
     if sent.exception() is not None or not sent.result().accepted:

@@ -72,7 +72,7 @@ def call(args: Namespace) -> None:
 
 
 def _await(client: Handle, graph: Graph, args: Namespace) -> None:
-    """Wait for the service; print it when it is not there at once, and what else is."""
+    """Wait for the service; unless it is there at once, print that and what else exists."""
 
     def ready() -> bool | None:
         return client.service_is_ready() or None

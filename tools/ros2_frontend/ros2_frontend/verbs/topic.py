@@ -23,11 +23,11 @@ def message_class(name: str) -> InterfaceClass:
 
 
 def class_of_topic(topic: str, graph: Graph, *, forever: bool = False) -> InterfaceClass:
-    """Return the message class that a topic carries, once it is there.
+    """Return the message class of a topic, once the topic appears.
 
     Raises:
-        UnknownNameError: The topic does not appear, unless it is waited for `forever`.
-        FrontendError: It carries several types.
+        UnknownNameError: The topic does not appear; with `forever`, the wait has no limit.
+        FrontendError: The topic has several types.
     """
     name = absolute(topic)
 

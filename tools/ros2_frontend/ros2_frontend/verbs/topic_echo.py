@@ -29,10 +29,10 @@ _INDEX = re.compile(r'\[(-?\d+)\]')
 
 
 def compile_filter(expression: str | None) -> Callable[[Message], bool]:
-    """Make a predicate of a Python expression in `m`, the message; None accepts every message.
+    """Compile a Python expression of `m`, the message, to a filter; None accepts all messages.
 
     Raises:
-        FrontendError: The expression is no Python; from the predicate: it fails on a message.
+        FrontendError: The expression is no Python; the filter raises it if it fails on a message.
     """
     if not expression:
         return lambda _: True
@@ -52,10 +52,10 @@ def compile_filter(expression: str | None) -> Callable[[Message], bool]:
 
 
 def parse_path(text: str | None) -> list[str]:
-    """Split the path of a field, e.g. `pose.position` or `position.[0]`; None is the message.
+    """Split a field path, e.g. `pose.position` or `position.[0]`; None means the message.
 
     Raises:
-        FrontendError: There is none in the text.
+        FrontendError: The text is no path.
     """
     if text is None:
         return []
@@ -66,10 +66,10 @@ def parse_path(text: str | None) -> list[str]:
 
 
 def select(message: Message, path: list[str]) -> Any:  # noqa: ANN401  # a field of any type
-    """Follow the parts of a path into a message.
+    """Return the field of a message at a path.
 
     Raises:
-        UnknownNameError: The field does not exist; it names those that do.
+        UnknownNameError: The field does not exist; the error names those that do.
     """
     value = message
     for part in path:
@@ -180,7 +180,7 @@ def echo(args: Namespace) -> None:
 
 
 def printer(args: Namespace) -> Callable[[Message, Mapping[str, object]], bool]:
-    """Make what prints a message with its times and numbers, unless the filter refuses it."""
+    """Return a function that prints a message with its metadata, unless the filter rejects it."""
     path = parse_path(args.field)
     accepts = compile_filter(args.filter_expr)
     length = None if args.full_length else args.truncate_length
@@ -199,7 +199,7 @@ def printer(args: Namespace) -> Callable[[Message, Mapping[str, object]], bool]:
 def _text(
     value: Message, cut: Abbreviation, args: Namespace, info: Mapping[str, object] | None
 ) -> str:
-    """Return one message, or the selected field of one, as the options set."""
+    """Format a message, or its selected field, as the options set."""
     if not hasattr(value, 'SLOT_TYPES'):
         head = '---Got new message, message info:---\n{}\n---Message data:---\n'
         return f'{head.format(info) if info else ""}{value}\n---'

@@ -101,7 +101,7 @@ _REPETITION = (
     PUBLISHER_QOS,
 )
 def pub(args: Namespace) -> None:
-    """Publish until Ctrl-C, or as often as wanted."""
+    """Publish until Ctrl-C, or a given number of times."""
     message_type = message_class(args.message_type)
     filler = Filler(expand_now=True)
     text = sys.stdin.read() if args.stdin else args.values
@@ -131,7 +131,7 @@ def pub(args: Namespace) -> None:
 def _await_subscriptions(
     graph: Graph, publisher: Handle, wanted: int, longest: float | None
 ) -> None:
-    """Wait for subscriptions, at most `longest` in [s], with a line each second."""
+    """Wait for subscriptions, at most `longest` in [s]; print a line each second."""
     deadline = time.monotonic() + (math.inf if longest is None else longest)
 
     def enough() -> bool | None:

@@ -34,7 +34,7 @@ def spread(values: Collection[int]) -> str:
 
 
 class Periods:
-    """The times between the last messages, at most `window` of them."""
+    """The periods between the last messages, at most `window` of them."""
 
     def __init__(self, window: int) -> None:
         self._periods: deque[int] = deque(maxlen=window)
@@ -42,7 +42,7 @@ class Periods:
         self._reported: int | None = None
 
     def add(self, now: int) -> str | None:
-        """Note a message at a time in [ns]; return what to print, once a second of that time."""
+        """Add a message at a time in [ns]; once a second, return the text to print."""
         last, self._last = self._last, now
         if last is None:
             return None
@@ -62,7 +62,7 @@ class Periods:
 
 
 def delay_text(delays: deque[int], news: list[int]) -> str | None:
-    """Move new delays in [ns] to the others; return what `topic delay` prints, None before any."""
+    """Move `news` in [ns] to `delays`; return the text of `topic delay`, None without any."""
     if not news:
         return 'no new messages' if delays else None
     delays.extend(news)
@@ -72,7 +72,7 @@ def delay_text(delays: deque[int], news: list[int]) -> str | None:
 
 
 def bandwidth(samples: Collection[tuple[float, int]], now: float) -> str | None:
-    """Return what `topic bw` prints of times in [s] and sizes in [byte]; None before two."""
+    """Return the text of `topic bw` for samples of ([s], [byte]); None for less than two."""
     if len(samples) < 2:
         return None
     times, sizes = zip(*samples, strict=True)
