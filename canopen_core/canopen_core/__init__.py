@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a CANopen master, simulated devices and tools share: errors and findings.
+"""Errors and findings that the CANopen master, simulated devices and tools share.
 
-Public besides: `can` (buses by name), `standard` (tables and codecs of CiA 301 and 402) and `eds`
-(EDS and DCF files).
+Public subpackages: `can` (buses by name), `standard` (tables and codecs of CiA 301 and 402) and
+`eds` (EDS and DCF files).
 """
 
 from .exceptions import (

@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that the CANopen packages raise, and the findings of a configuration.
+"""Exceptions of the CANopen packages, and findings in configuration files.
 
 ::
 
     CanopenError
     ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
-    ├── OtherMasterError             another master leads this bus, or may
-    ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
+    ├── OtherMasterError             another master controls this bus, or may control it
+    ├── CodecError (ValueError)      a value does not fit its type, or bytes are not a message
     ├── ObjectError (LookupError)    a device has no object of that name or number
     ├── SdoError                     a device did not do what an SDO requested
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
-    ├── BootError                    a device did not come up; names the phase
+    ├── BootError                    a device did not boot; names the phase
     ├── DriveError                   a drive refused a command or did not reach a state in time
     └── LifecycleError               a managed node cannot make this transition now
 
@@ -42,7 +42,7 @@ class Problem:
     remedy: str  # what to do about it
 
     def __str__(self) -> str:
-        """Write it as compilers do: file, line, key, message, remedy."""
+        """Return it as compilers write it: file, line, key, message, remedy."""
         place = f'{self.file}:{self.line}' if self.line else str(self.file)
         key = f'{self.key}: ' if self.key else ''
         remedy = f' ({self.remedy})' if self.remedy else ''
@@ -68,7 +68,7 @@ class BusError(CanopenError, OSError):
 
 
 class OtherMasterError(CanopenError):
-    """Another master leads this bus already, or that is not known; the message says which."""
+    """Another master controls this bus, or may control it; the message says which."""
 
 
 class CodecError(CanopenError, ValueError):
@@ -96,9 +96,9 @@ class SdoAbortError(SdoError):
 
 
 class BootError(CanopenError):
-    """A device did not come up.
+    """A device did not boot.
 
-    Scenarios: no answer, another identity than expected, configuration refused.
+    Scenarios: no answer, unexpected identity, configuration refused.
     """
 
 
@@ -107,12 +107,12 @@ class DriveError(CanopenError):
 
 
 class LifecycleError(CanopenError):
-    """A managed node cannot make this transition now; the message names others."""
+    """A managed node cannot make this transition now; the message names the possible ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where something is written."""
+    """Location in a configuration file."""
 
     file: Path = Path()
     line: int = 0  # line, from 1; 0 for the whole file
@@ -120,7 +120,7 @@ class Place:
 
 
 class RefusedError(Exception):
-    """A value cannot be taken. Never leaves this layer: readers turn it into a finding."""
+    """A value is invalid. Internal: readers turn it into a finding."""
 
     def __init__(self, message: str, remedy: str) -> None:
         super().__init__(message)
@@ -129,10 +129,10 @@ class RefusedError(Exception):
 
 
 class Findings:
-    """Errors and warnings in the order in which they were found, each once.
+    """Errors and warnings in the order in which they were found, without duplicates.
 
-    A value in ``defaults`` is read again for every device; what is wrong with it counts once, with
-    the names of all that it is about.
+    A value in ``defaults`` is read again for every device; its finding is listed once, with the
+    names of all affected devices.
     """
 
     def __init__(self) -> None:
@@ -140,7 +140,7 @@ class Findings:
         self._warnings: dict[tuple[Place, str], tuple[Problem, list[str]]] = {}
 
     def error(self, place: Place, message: str, remedy: str) -> None:
-        """Add something that cannot be accepted."""
+        """Add an error."""
         problem = Problem(place.file, place.line, place.key, message, remedy)
         self._errors.setdefault((place, message), problem)
 
@@ -149,14 +149,14 @@ class Findings:
         self.error(place, reason.message, reason.remedy)
 
     def warning(self, place: Place, message: str, remedy: str, about: str = '') -> None:
-        """Add something odd that could be understood; ``about`` names an axis that it is about."""
+        """Add a warning; ``about`` names the affected axis."""
         problem = Problem(place.file, place.line, place.key, message, remedy)
         _, names = self._warnings.setdefault((place, message), (problem, []))
         if about and about not in names:
             names.append(about)
 
     def extend(self, errors: Iterable[Problem] = (), warnings: Iterable[Problem] = ()) -> None:
-        """Add what was found in another file."""
+        """Add the findings of another file."""
         for add, problems in ((self.error, errors), (self.warning, warnings)):
             for problem in problems:
                 place = Place(problem.file, problem.line, problem.key)
@@ -164,12 +164,12 @@ class Findings:
 
     @property
     def errors(self) -> tuple[Problem, ...]:
-        """All errors, in the order of the lines."""
+        """All errors, ordered by line."""
         return tuple(sorted(self._errors.values(), key=lambda each: (str(each.file), each.line)))
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """What is to be looked at, as it was found; other files' included."""
+        """All warnings in the order found, including those of other files."""
         return tuple(
             replace(problem, message=f'{", ".join(names)}: {problem.message}')
             if names
@@ -178,10 +178,10 @@ class Findings:
         )
 
     def raise_errors(self) -> None:
-        """End with all errors, if there are any.
+        """Raise all errors as one ConfigError, if there are any.
 
         Raises:
-            ConfigError: There are; it lists them in the order of the lines.
+            ConfigError: There are errors; the message lists them ordered by line.
         """
         if self._errors:
             raise ConfigError(self.errors)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """CAN buses by name, with time stamps, counters and logs.
 
-What reads and writes logs is loaded when it is used: it brings python-can.
+Log readers and writers are imported on first use, because they import python-can.
 """
 
 from importlib import import_module

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every adapter that python-can has a driver for, by python-can."""
+"""CAN adapters with a python-can driver."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class AdapterBus(Bus):
     """
 
     def __init__(self, name: str, interface: str, channel: str, bitrate: int | None) -> None:
-        """Open an interface of python-can at a channel; bitrate None leaves the adapter's."""
+        """Open a channel of a python-can interface; bitrate None keeps the adapter's bit rate."""
         super().__init__(name)
         self._open = partial(_open_driver, name, interface, channel, bitrate)
         self._bus = self._open()
@@ -67,7 +67,7 @@ class AdapterBus(Bus):
             raise BusError(f'{self.name} refuses a frame: {error}') from error
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; an adapter that went away is opened again when it is back."""
+        """Wait for frames; reopen an unplugged adapter when it is back."""
         if self._closed:
             raise BusError(f'{self.name} is closed')
         if self._gone:
@@ -91,7 +91,7 @@ class AdapterBus(Bus):
         return frames
 
     def _reopen(self) -> None:
-        """Go on with the adapter where it is back; opening it may take a driver seconds."""
+        """Resume with the adapter if it is back; some drivers take seconds to open it."""
         if self._reopening is None:
             self._reopening = Future()
             Thread(target=self._replace, args=(self._reopening,), daemon=True).start()
@@ -104,7 +104,7 @@ class AdapterBus(Bus):
         _log.warning('%s is back', self.name)  # as loud as its going was
 
     def _replace(self, opened: Future[can.BusABC]) -> None:
-        """Release the adapter that went away, and open it anew."""
+        """Release the unplugged adapter, and open it again."""
         with contextlib.suppress(Exception):  # of a driver whose device is gone
             self._bus.shutdown()
         try:
@@ -129,9 +129,9 @@ class AdapterBus(Bus):
         return message
 
     def _next(self, timeout: float) -> can.Message | None:
-        """Return the next message; one that its driver cannot decode is dropped.
+        """Return the next message; drop messages that the driver cannot decode.
 
-        Drivers of serial adapters raise whatever a line with a damaged byte leads to.
+        Drivers of serial adapters raise various exceptions for a line with a damaged byte.
         """
         try:
             message = self._bus.recv(timeout)
@@ -169,7 +169,7 @@ class AdapterBus(Bus):
         return from_message(message, self._last)
 
     def _steady(self, stamp: float) -> float:
-        """Move a driver's stamp to the steady clock; those that are no wall clock become now."""
+        """Convert a driver's stamp to the steady clock; stamps off the wall clock become now."""
         now = self._clock.update() * 1e-9
         steady = stamp - self._clock.offset * 1e-9
         return steady if now - _WALL_CLOCK_SPAN < steady <= now else now
@@ -193,7 +193,7 @@ class AdapterBus(Bus):
 
 
 def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
-    """Return python-can's message with its time on the wall clock in [s], 0 for one to be sent."""
+    """Convert a frame to python-can's message; time on the wall clock in [s], 0 for sending."""
     return can.Message(
         timestamp=timestamp,
         arbitration_id=frame.can_id,
@@ -206,7 +206,7 @@ def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
 
 
 def from_message(message: can.Message, timestamp: float) -> Frame:
-    """Return python-can's classic message as a frame, with its steady time in [s]."""
+    """Convert python-can's classic message to a frame with its steady time in [s]."""
     return Frame(
         message.arbitration_id,
         bytes(message.data),
@@ -234,7 +234,7 @@ def _open_driver(name: str, interface: str, channel: str, bitrate: int | None) -
 
 
 def _is_unplugged(error: BaseException | None) -> bool:
-    """Return whether an error of a driver is that of a device that is gone."""
+    """Return whether a driver's error means that the adapter is unplugged."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _UNPLUGGED:
             return True

@@ -20,7 +20,7 @@ _CLOCK_READINGS = 5
 
 @dataclass(slots=True)
 class BusCounters:
-    """What a bus object has seen; it counts up and never back."""
+    """Counters of a bus object; they only increase."""
 
     sent: int = 0  # frames handed to the interface
     received: int = 0  # frames from others
@@ -32,7 +32,7 @@ class BusCounters:
 class Bus(AbstractContextManager['Bus']):
     """A CAN bus. Send from any thread; receive from one thread only.
 
-    Frames that this object sent are never received by it.
+    An object never receives its own frames.
     """
 
     def __init__(self, name: str) -> None:
@@ -48,23 +48,23 @@ class Bus(AbstractContextManager['Bus']):
         """Hand a frame to the interface, without waiting for the bus.
 
         Raises:
-            BusError: The interface refuses it (down, transmit queue full).
+            BusError: The interface refuses the frame (down, transmit queue full).
         """
 
     def limit_queue(self, frames: int) -> None:  # most cannot do it
-        """Limit the frames that wait for the bus to about so many, where the interface can do it.
+        """Limit the transmit queue to about this many frames, if the interface supports it.
 
-        Those beyond are refused. What waits while the cable is off leaves when it is on again.
+        Further frames are refused. Frames queued while the cable is unplugged are sent afterwards.
         """
 
     @abstractmethod
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for the first frame at most timeout [s]; return all that are there, in their order.
+        """Wait for a frame, at most timeout [s]; return all available frames in order.
 
         The list is empty after the time-out or after :meth:`wake`.
 
         Raises:
-            BusError: The interface went away.
+            BusError: The interface disappeared.
         """
 
     @abstractmethod
@@ -80,7 +80,7 @@ class Bus(AbstractContextManager['Bus']):
 
 
 def wall_clock_offset() -> float:
-    """Return wall clock minus steady clock in [s], without a pause between reading both."""
+    """Return wall clock minus steady clock in [s], from the quickest of several readings."""
     readings = []
     for _ in range(_CLOCK_READINGS):
         before, wall, after = monotonic(), time(), monotonic()
@@ -89,10 +89,10 @@ def wall_clock_offset() -> float:
 
 
 class WallClock:
-    """How far the wall clock is ahead of the steady clock, also while it is being set.
+    """Offset of the wall clock to the steady clock, also while the wall clock is being set.
 
-    Both run at one rate, so what is known of the difference is kept within what is read anew. A
-    thread that loses the processor between two readings gets a wider bound, and no error.
+    Both run at one rate, so the known offset is clamped to the bounds of each new reading. A
+    thread preempted between two readings gets wider bounds, not a wrong offset.
     """
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ QUEUE_FRAMES = 100_000  # a bus object that is not read must not eat up the memo
 
 
 class VirtualWire:
-    """What the buses of one name are connected to."""
+    """The medium that connects virtual buses of one name."""
 
     def __init__(self) -> None:
         self.lock = Lock()
@@ -120,7 +120,7 @@ class VirtualWire:
 
 
 class VirtualBus(Bus):
-    """A connection to a wire in this process: reliable, and in one order for all."""
+    """A bus inside this process: lossless, with the same frame order for all."""
 
     def __init__(self, name: str, wire: VirtualWire) -> None:
         super().__init__(name)
@@ -133,7 +133,7 @@ class VirtualBus(Bus):
             wire.taps.append(self)
 
     def send(self, frame: Frame) -> None:
-        """Hand the frame to all others on the wire.
+        """Deliver the frame to all other buses on the wire.
 
         Raises:
             BusError: The bus was closed.
@@ -177,7 +177,7 @@ class VirtualBus(Bus):
             self._arrived.notify()
 
     def close(self) -> None:
-        """Leave the wire; a waiting :meth:`receive` ends in a BusError."""
+        """Disconnect from the wire; a waiting :meth:`receive` raises a BusError."""
         with self._wire.lock:
             if self in self._wire.taps:
                 self._wire.taps.remove(self)
@@ -191,7 +191,7 @@ _wires_lock = Lock()
 
 
 def open_virtual(name: str, channel: str) -> VirtualBus:
-    """Connect to the wire of a channel; it lives as long as a bus on it."""
+    """Connect to the wire of a channel, which exists as long as a bus uses it."""
     with _wires_lock:
         wire = _wires.get(channel)
         if wire is None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A thread that owns a bus: of a master and its cycle, or of simulated devices."""
+"""A thread that owns a bus, for the cycle of a master or for simulated devices."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ logger = logging.getLogger(__name__)
 
 
 class _Answer(Future[T]):
-    """A future that cannot be awaited where it is made."""
+    """A future that refuses to be waited for in the bus thread itself."""
 
     def __init__(self, maker: threading.Thread) -> None:
         super().__init__()
         self._maker = maker
 
     def result(self, timeout: float | None = None) -> T:
-        """Wait; a BusError in the thread that would have to go on meanwhile."""
+        """Wait for the result; raise a BusError in the bus thread, which would block itself."""
         if not self.done() and threading.current_thread() is self._maker:
             raise BusError(
                 f'{self._maker.name} cannot wait for itself: a callback must not wait for its '
@@ -43,9 +43,9 @@ class _Answer(Future[T]):
 
 
 class BusThread:
-    """Reads a bus, and runs what other threads hand over, between two steps of its owner.
+    """Reads a bus, and runs functions queued by other threads between two steps of its owner.
 
-    Other threads get a future for what they hand over; nothing is locked.
+    Other threads get a future for each queued function; nothing is locked.
     """
 
     def __init__(
@@ -73,17 +73,17 @@ class BusThread:
         self._future = future or partial(_Answer, self._thread)
 
     def refuse_before_start(self, reason: str) -> None:
-        """Refuse what is handed over before the start, which otherwise waits for it."""
+        """Refuse functions queued before the start, instead of keeping them until then."""
         self._too_early = reason
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start the thread, which calls begin first; it may want a priority."""
+        """Start the thread, which calls begin first, for example to set its priority."""
         self._begin = begin
         self._started = True
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread after the step that runs, and wait for it for 5 s."""
+        """End the thread after the present step, and wait up to 5 s for it."""
         self.stopping = True
         if not self._started:
             self._end()
@@ -94,20 +94,20 @@ class BusThread:
             logger.error('%s hangs in its driver, and is left', self._owner)
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """Run a function in the thread; it must not wait.
+        """Run a function in the thread; the function must not block.
 
         Returns:
-            Its result or its error; a BusError where the thread has ended or ends before.
+            Future with its result or error, or a BusError if the thread ends before.
         """
         future: Future[T] = self._future()
         self._hand_over(future, lambda: future.set_result(function()))
         return future
 
     def run_later(self, begin: Callable[[Future[T]], None]) -> Future[T]:
-        """Start something in the thread that ends later, there it sets the result of the future.
+        """Start an operation in the thread that later sets the result of the future there.
 
         Returns:
-            The future; a BusError where the thread ends before.
+            The future; it gets a BusError if the thread ends before.
         """
         future: Future[T] = self._future()
 
@@ -120,7 +120,7 @@ class BusThread:
         return future
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; a bus that went away, or fails by a defect, is waited for."""
+        """Wait for frames; if the bus disappeared or fails, wait until it works again."""
         try:
             frames = self._bus.receive(timeout)
         except Exception as error:  # noqa: BLE001  # the cycle of the owner goes on
@@ -141,7 +141,7 @@ class BusThread:
             logger.error('a defect in reading %s', self._bus.name, exc_info=error)
 
     def do_work(self) -> None:
-        """Run what was handed over; for the owner, in the thread."""
+        """Run queued functions; the owner calls this in the thread."""
         while self._work:
             future, work = self._work.popleft()
             if future.set_running_or_notify_cancel():
@@ -185,7 +185,7 @@ class BusThread:
             self.on_failure()
 
     def _defect(self, error: Exception) -> None:
-        """Do what can still be done after a defect that has ended the thread, in the thread."""
+        """Clean up in the thread after an unexpected exception has ended its loop."""
 
     def _end(self) -> None:
         self._ended = True

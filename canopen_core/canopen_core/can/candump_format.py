@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can-utils' ``candump`` writes: lines of its logs (``-L``, ``-l``), and of its screen.
+"""Text formats of can-utils' ``candump``: its logs (``-L``, ``-l``) and its screen output.
 
-python-can takes error frames of such a log for data frames, and writes the same for all of them.
+python-can reads error frames of such logs as data frames, and writes all of them alike.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .frame import checked, Frame
 _ERROR_FLAG = 0x2000_0000
 _STANDARD_DIGITS = 3
 LOG_LINE = re.compile(r'\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#')
-"""How a line of a log begins."""
+"""Beginning of a line of a log."""
 _LINE = re.compile(
     r'\((?P<time>\d+\.\d+)\)\s+(?P<interface>\S+)\s+'
     r'(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#'
@@ -31,7 +31,7 @@ SCREEN_LINE = re.compile(
     r'(?:[RT]X\s+\S\s+\S\s+)?'  # direction and flags of CAN FD: candump -x
     r'(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<length>\d+)\]'
 )
-"""How a line of the screen begins."""
+"""Beginning of a line of the screen output."""
 _BYTES = re.compile(
     r'(?:\s+([0-9A-Fa-f]{2}(?:\s[0-9A-Fa-f]{2})*))?(?:\s+(?:\'.*\'|ERRORFRAME))?\s*'
 )
@@ -48,12 +48,12 @@ class LoggedFrame(NamedTuple):
 
 
 def log_channel(bus_name: str) -> str:
-    """Return the name for the log: the bus's own when canplayer can play to it, else vcan0."""
+    """Return the bus name for the log: its own if canplayer can replay to it, else vcan0."""
     return bus_name if _PLAYABLE.fullmatch(bus_name) else _STAND_IN
 
 
 def format_line(frame: Frame, timestamp: float, channel: str, *, sent: bool = False) -> str:
-    """Return the line of a frame, with its wall clock time in [s], its direction and its end."""
+    """Format a frame as a log line with wall clock time in [s], direction and line end."""
     can_id, data, _, is_extended, is_remote, is_error, remote_length = frame
     if is_error:
         return f'({timestamp:.6f}) {channel} {can_id | _ERROR_FLAG:08X}#{data.hex().upper()}\n'
@@ -63,10 +63,10 @@ def format_line(frame: Frame, timestamp: float, channel: str, *, sent: bool = Fa
 
 
 def read_lines(lines: Iterable[str]) -> Iterator[LoggedFrame]:
-    """Read lines of a log; like canplayer it skips those that do not begin with a time.
+    """Read lines of a log; like canplayer, skip lines that do not begin with a time.
 
     Raises:
-        CodecError: A line is no classic CAN frame; the message has its number.
+        CodecError: A line is not a classic CAN frame; the message has the line number.
     """
     for number, line in enumerate(lines, start=1):
         if not line.startswith('('):
@@ -81,7 +81,7 @@ def parse_line(line: str) -> LoggedFrame:
     """Read a line of a log.
 
     Raises:
-        CodecError: It is no classic CAN frame in candump's format.
+        CodecError: The line is not a classic CAN frame in candump's format.
     """
     match = _LINE.fullmatch(line.strip())
     if match is None:
@@ -95,10 +95,10 @@ def parse_line(line: str) -> LoggedFrame:
 
 
 def read_screen(lines: Iterable[str]) -> Iterator[LoggedFrame]:
-    """Read what candump prints, with or without times; other lines are skipped.
+    """Read screen output of candump, with or without times; skip other lines.
 
     Raises:
-        CodecError: A line is no classic CAN frame; the message has its number.
+        CodecError: A line is not a classic CAN frame; the message has the line number.
     """
     found: list[LoggedFrame] = []
     for number, line in enumerate(lines, start=1):
@@ -131,7 +131,7 @@ def _shown(match: re.Match[str], content: str) -> LoggedFrame:
 
 
 def _seconds(time: str | None) -> float:
-    """Return a time of the screen in [s]: since 1970, the start or the last, or local time."""
+    """Return a screen time in [s]: since 1970, the start or the last frame, or local time."""
     if time is None:
         return 0.0
     try:
@@ -143,7 +143,7 @@ def _seconds(time: str | None) -> float:
 def _logged(
     interface: str, digits: str, data: bytes, remote: int | None, timestamp: float
 ) -> LoggedFrame:
-    """Return a frame of its parts; of a remote request with the length that it asks for."""
+    """Build a frame from its parts; a remote frame has the requested length."""
     can_id = int(digits, 16)
     has_long_id = len(digits) > _STANDARD_DIGITS
     is_error = bool(can_id & _ERROR_FLAG) and has_long_id

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A CAN frame as a value, what error frames report, the load of a bus, and its last frames."""
+"""CAN frames, the content of error frames, bus load, and a ring of the last frames."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PAYLOAD_MAX = 8  # [byte]
 
 
 class Frame(NamedTuple):
-    """A classic CAN frame (ISO 11898-1). A tuple, because thousands are made each second."""
+    """A classic CAN frame (ISO 11898-1). A tuple, because thousands are created each second."""
 
     can_id: int  # 11-bit or 29-bit identifier
     data: bytes = b''  # payload of 0 to 8 bytes
@@ -31,7 +31,7 @@ class Frame(NamedTuple):
 
 
 def checked(frame: Frame) -> Frame:
-    """Return the frame when it is a classic CAN frame.
+    """Return the frame if it is a valid classic CAN frame.
 
     Raises:
         ValueError: The identifier is out of range or the payload too long.
@@ -92,7 +92,7 @@ _WARNING_LEVEL, _PASSIVE, _ACTIVE_AGAIN = 0x0C, 0x30, 0x40  # of CONTROLLER_PROB
 
 
 class ControllerState(Enum):
-    """Error state of a CAN controller (ISO 11898-1, fault confinement); the value is in words."""
+    """Error state of a CAN controller (ISO 11898-1, fault confinement); the value is its name."""
 
     ACTIVE = 'error active'
     WARNING = 'error warning'
@@ -101,7 +101,7 @@ class ControllerState(Enum):
 
 
 def controller_state(frame: Frame) -> ControllerState | None:
-    """Return the state that an error frame reports, None when it reports none."""
+    """Return the controller state in an error frame; None if it reports none."""
     if frame.can_id & _BUS_OFF:
         return ControllerState.BUS_OFF
     if frame.can_id & _RESTARTED:
@@ -115,14 +115,14 @@ def controller_state(frame: Frame) -> ControllerState | None:
 
 
 def error_counters(frame: Frame) -> tuple[int, int] | None:
-    """Return the transmit and the receive error counter, None when the frame has none."""
+    """Return transmit and receive error counter of an error frame; None if it has none."""
     if not frame.can_id & _COUNTERS or len(frame.data) < 8:
         return None
     return frame.data[6], frame.data[7]
 
 
 def is_unacknowledged(frame: Frame) -> bool:
-    """Whether an error frame reports that no other station has acknowledged a frame."""
+    """Whether an error frame reports that no other node acknowledged a frame."""
     return bool(frame.can_id & _NO_ACKNOWLEDGE)
 
 
@@ -159,17 +159,17 @@ _SAMPLES = 10  # per window
 
 
 def frame_bits(size: int, *, is_extended: bool = False) -> int:
-    """Return the bits of a frame with a payload of size [byte]: no stuffing, with intermission."""
+    """Return the bits of a frame with size [byte] of payload: intermission, but no stuff bits."""
     return _FRAME_BITS + 8 * size + (_EXTENSION_BITS if is_extended else 0)
 
 
 def stuff_bits_worst(size: int, *, is_extended: bool = False) -> int:
-    """Return how many bits stuffing adds to a frame at most."""
+    """Return the greatest number of stuff bits of a frame."""
     return (_stuffed_bits(size, is_extended) - 1) // _WORST_STUFF_DISTANCE
 
 
 def stuff_bits_mean(size: int, *, is_extended: bool = False) -> float:
-    """Return how many bits stuffing adds to a frame of random content on average."""
+    """Return the mean number of stuff bits of a frame with random content."""
     return (_stuffed_bits(size, is_extended) - 1) / _MEAN_STUFF_DISTANCE
 
 
@@ -179,7 +179,7 @@ def _stuffed_bits(size: int, is_extended: bool) -> int:
 
 @dataclass(frozen=True, slots=True)
 class LoadFigures:
-    """What a bus carried in the last window."""
+    """Load of a bus in the last window."""
 
     frames_per_second: float = 0.0  # frames in [1/s]
     # share of the time that the bus was busy, 0 to 1, with the stuffing of random content
@@ -187,13 +187,13 @@ class LoadFigures:
 
 
 class BusLoad:
-    """Estimates the load from the frames that are sent and received.
+    """Estimates the bus load from sent and received frames.
 
-    Counting a frame is one addition; the arithmetic is done when the figures are read.
+    Counting a frame is one addition; the rest is computed when the figures are read.
     """
 
     def __init__(self, bitrate: int, now: float, window: float = 1.0) -> None:
-        """Start at a steady time in [s]; figures look back window [s] when they are read often.
+        """Start at a steady time in [s]; figures cover the last window [s] if they are read often.
 
         Raises:
             ValueError: Bit rate in [bit/s] or window is not positive.
@@ -207,7 +207,7 @@ class BusLoad:
         self._samples = deque([self._sample(now)])
 
     def count(self, frame: Frame) -> None:
-        """Count a frame, sent or received; error frames are notes of the controller and free."""
+        """Count a sent or received frame; error frames use no bus time and are not counted."""
         if frame.is_error:
             return
         counts = self._extended if frame.is_extended else self._standard
@@ -230,7 +230,7 @@ class BusLoad:
         )
 
     def _sample(self, now: float) -> tuple[float, int, float]:
-        """Return the time, and the frames and bits until then."""
+        """Return the time, and the numbers of frames and bits up to it."""
         frames, bits = 0, 0.0
         for is_extended, counts in ((False, self._standard), (True, self._extended)):
             for size, count in enumerate(counts):
@@ -256,11 +256,11 @@ class RecordedFrame(NamedTuple):
 
 
 class FrameRing:
-    """Keeps the last frames; the oldest make room for new ones.
+    """Ring buffer of the last frames; new frames overwrite the oldest.
 
-    Frames are packed into one block of bytes: no object of a frame outlives it, so that the
-    garbage collector has nothing to look at, however many there are. One thread records, any other
-    one may read meanwhile; nothing is locked.
+    Frames are packed into one block of bytes and leave no Python objects behind, so the garbage
+    collector has nothing to scan. One thread records; any other thread may read at the same time,
+    without locks.
     """
 
     SENT = 0x80  # direction of a frame that this process has sent
@@ -281,7 +281,7 @@ class FrameRing:
         self._at = 0  # [byte] where the next one goes
 
     def record(self, frame: Frame, timestamp: float, direction: int = 0) -> None:
-        """Keep a frame with its steady time in [s]; direction is :attr:`SENT` or 0 (received)."""
+        """Store a frame with its steady time in [s]; direction is :attr:`SENT` or 0 (received)."""
         can_id, data, _, is_extended, is_remote, is_error, remote_length = frame
         if is_extended or is_remote or is_error:
             can_id |= _EXTENDED * is_extended | _REMOTE * is_remote | _ERROR * is_error
@@ -293,9 +293,9 @@ class FrameRing:
         self.count += 1
 
     def chunks(self) -> Iterator[list[RecordedFrame]]:
-        """Yield what is there now, the oldest first, a few at once.
+        """Yield the recorded frames in chunks, the oldest first.
 
-        Frames whose place is taken by newer ones while this is read are left out.
+        Frames that are overwritten while this is read are left out.
         """
         end = self.count
         number = max(0, end - self.capacity)

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Logs of a bus in formats that can-utils and other tools read.
+"""Bus logs in formats that can-utils and other tools read.
 
-Written by the suffix of the file:
+The suffix of the file selects the format for writing:
 
 - ``.asc``: Vector's text format (can-utils: asc2log)
 - ``.blf``: Vector's binary format
 - ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc; Wireshark)
 
-Read, by what is in the file: these, what candump prints, PCAN's .trc, and csv of SavvyCAN and
-python-can. python-can does what is not done here.
+The content selects the format for reading: those above, candump's screen output, PCAN's .trc, and
+csv of SavvyCAN and python-can. python-can handles the formats that are not implemented here.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _ASC_TIME = re.compile(r'(?i)((?:date|begin triggerblock)\s.*:\d\d)\.(\d{1,2})(?
 
 
 class AscFile(io.TextIOWrapper):
-    """Text of an .asc, in which python-can's writer loses zeros: 7 ms of its start are ``.7``."""
+    """Text of an .asc; corrects python-can's writer, which writes 7 ms of the start as ``.7``."""
 
     def readline(self, size: int = -1, /) -> str:  # type: ignore[override]  # as its base has it
         """Return the next line with three digits of milliseconds."""
@@ -65,8 +65,8 @@ def _with_milliseconds(text: str) -> str:
 class LogWriter:
     """Writes frames to a log.
 
-    Wall clock times are steady times plus the distance of the clocks at the start, so the log
-    runs evenly also when the clock is set.
+    Wall clock times are steady times plus the clock offset at the start, so times in the log stay
+    continuous when the clock is set.
     """
 
     def __init__(self, path: Path, bus_name: str, wall_offset: float) -> None:
@@ -94,7 +94,7 @@ class LogWriter:
         (self._text if self._writer is None else self._writer.file).flush()
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
+        """Write buffered frames, and close the file."""
         if self._writer is None:
             self._text.close()
         else:
@@ -103,7 +103,7 @@ class LogWriter:
 
 @dataclass(frozen=True, slots=True)
 class _TextFormat:
-    """A format of text."""
+    """A text format."""
 
     name: str  # for messages
     begins: re.Pattern[str]  # what its first line that counts begins with
@@ -112,14 +112,14 @@ class _TextFormat:
 
 
 def read_log(path: Path, interface: str = '') -> Iterator[Frame]:
-    """Yield the frames of one bus; their time stamps are on the wall clock where the log has it.
+    """Yield the frames of one bus, with wall clock time stamps if the log has them.
 
-    The format shows in what the log contains. It names its bus; empty means the only one.
+    The format is detected from the content. An empty bus name selects the only bus of the log.
 
     Raises:
-        CodecError: The log is damaged, of an unknown format, has CAN FD frames, or those of
-            another bus besides; the message names the format and the place.
-        OSError: It cannot be read.
+        CodecError: The log is damaged, has an unknown format, CAN FD frames, or frames of a
+            second bus; the message names the format and the place.
+        OSError: The log cannot be read.
     """
     first = ''
     for number, logged in enumerate(read_buses(path)):
@@ -137,7 +137,7 @@ def read_buses(path: Path) -> Iterator[LoggedFrame]:
     """Yield the frames of all buses of a log.
 
     Raises:
-        CodecError, OSError: As of :func:`read_log`.
+        CodecError, OSError: See :func:`read_log`.
     """
     with path.open('rb') as file:
         head = file.read(_HEAD_SIZE)
@@ -179,7 +179,7 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
 def _read_binary(
     path: Path, reader: Callable[[Path], Iterable[can.Message]]
 ) -> Iterator[LoggedFrame]:
-    """Open a log when its first frame is read, so that its format has a name by then."""
+    """Open a binary log when its first frame is read, so that errors can name its format."""
     yield from _logged(reader(path), _name_of_channel)
 
 
@@ -193,7 +193,7 @@ def _closing(
 def _logged(
     messages: Iterable[can.Message], name: Callable[[can.Message], str] = lambda message: ''
 ) -> Iterator[LoggedFrame]:
-    """Yield the messages of a reader of python-can."""
+    """Yield the frames of a python-can reader."""
     for message in messages:
         if message.is_fd:
             raise CodecError('it has CAN FD frames; only classic CAN is supported')

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A CAN bus between the processes of one host, in python-can's ``udp_multicast`` format.
 
-Datagrams stay on the loopback interface. Each bus sends from a loopback address of its own, which
-its own receiver blocks in the kernel, so an echo costs nothing and own frames are never received.
+Datagrams stay on the loopback interface. Each bus sends from a loopback address of its own, and
+its receiver blocks that address in the kernel: a bus never receives its own frames, at no cost.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _TAIL = _entries(is_fd=False, bitrate_switch=False, error_state_indicator=False)
 _PLAIN_FLAGS = _flags(is_extended=False, is_remote=False, is_error=False)
 _LAYOUT = (_HEAD, _PLAIN_FLAGS, _LENGTHS[0][1:-1], _TAIL)  # for the compiled reader
 _PLAIN_HEADS = tuple(_HEAD + _pack(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1))
-"""Everything before the length of a data frame, by its 11-bit identifier."""
+"""All bytes before the length of a data frame, by its 11-bit identifier."""
 
 
 def encode(frame: Frame) -> bytes:
@@ -71,7 +71,7 @@ def encode(frame: Frame) -> bytes:
 
 
 def decode(datagram: bytes, timestamp: float) -> Frame:
-    """Read a datagram that came at a steady time in [s]; the time inside is the sender's."""
+    """Decode a datagram received at a steady time in [s]; the time inside is the sender's."""
     try:
         fields = msgpack.unpackb(datagram, raw=False)
     except (ValueError, TypeError) as error:
@@ -106,9 +106,9 @@ def _flag(fields: Mapping[object, object], name: str, *, default: bool) -> bool:
 
 
 DEFAULT_GROUP = '239.74.163.2'
-"""IPv4 group that python-can calls its default."""
+"""Default IPv4 group of python-can."""
 DEFAULT_PORT = 43113
-"""UDP port that python-can takes by default."""
+"""Default UDP port of python-can."""
 
 _LOOPBACK = '127.0.0.1'
 _IP_BLOCK_SOURCE = 38  # linux/in.h; Python's socket module does not name it
@@ -184,7 +184,7 @@ def _open_sender(name: str, group: str, port: int) -> socket.socket:
 
 
 def _bind_own_address(sender: socket.socket) -> None:
-    """Bind to a loopback address that no other bus of this host has."""
+    """Bind to a loopback address that no other bus of this host uses."""
     chosen = random.SystemRandom()
     for attempt in range(_SOURCE_TRIES + 1):
         # 127.1.0.0 to 127.254.255.255, so neither the usual addresses nor the broadcast

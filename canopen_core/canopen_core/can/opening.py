@@ -33,10 +33,10 @@ _log = logging.getLogger(__name__)
 
 
 def open_bus(name: str) -> Bus:
-    """Open a bus by a name of the table; ``auto`` picks one and logs which, and it has that name.
+    """Open a bus by a name of the table; ``auto`` picks one, logs which, and takes its name.
 
     Raises:
-        BusError: No such interface, or it is down; the message names the remedy.
+        BusError: The interface does not exist or is down; the message names the remedy.
     """
     resolved = resolve_name(name)
     if resolved != name:
@@ -54,12 +54,12 @@ def open_bus(name: str) -> Bus:
 
 
 def resolve_name(name: str) -> str:
-    """Return the name of the bus that :func:`open_bus` would open; it is ``name`` but for auto."""
+    """Return the name of the bus that :func:`open_bus` would open: ``name``, unless it is auto."""
     return next(auto_names()) if name == AUTO else name
 
 
 def auto_names() -> Iterator[str]:
-    """Yield the buses that ``auto`` may be: the first, and others for further robots beside it."""
+    """Yield the buses that ``auto`` may select: the first, then others for further robots."""
     interface = can_interfaces().get(_AUTO_INTERFACE)
     if interface is not None and interface.is_up and hasattr(socket, 'AF_CAN'):
         yield interface.name

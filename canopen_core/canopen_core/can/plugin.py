@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Our buses as a python-can interface, so that its tools and python-canopen reach them.
+"""Our buses as a python-can interface, for python-can's tools and python-canopen.
 
 ::
 
@@ -34,10 +34,10 @@ class ArmCanopenBus(can.BusABC):
         receive_own_messages: bool = False,
         **_: object,
     ) -> None:
-        """Open the bus of the name that :func:`canopen_core.can.open_bus` takes.
+        """Open a bus by its name for :func:`canopen_core.can.open_bus`.
 
         Raises:
-            can.CanInitializationError: It cannot be opened, or own messages were requested.
+            can.CanInitializationError: The bus cannot be opened, or own messages were requested.
         """
         if receive_own_messages:
             raise can.CanInitializationError('these buses never receive own messages')
@@ -50,7 +50,7 @@ class ArmCanopenBus(can.BusABC):
         super().__init__(channel, can_filters)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Send a message; it never waits, so the time-out means nothing.
+        """Send a message without waiting; the time-out is ignored.
 
         Raises:
             can.CanOperationError: The bus refuses it.

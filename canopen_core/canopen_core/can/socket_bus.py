@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bus on a datagram socket needs: waiting, waking, kernel time stamps and loss counts.
+"""Base of buses on a datagram socket: waiting, waking, kernel time stamps and loss counts.
 
 The receive path is compiled: datagrams.c, built by the C compiler of the machine. Without a
-compiler one warning says so, and frames are read in Python, at several times the cost.
-``CANOPEN_CORE_COMPILED=0`` asks for that.
+compiler a warning is logged, and frames are read in Python, at several times the cost.
+``CANOPEN_CORE_COMPILED=0`` selects Python.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ _PORT = struct.Struct('@H')
 _loading = Lock()  # several threads may open the first bus
 
 Layout: TypeAlias = Sequence[bytes]
-"""Bytes of a plain frame before and behind its identifier, before and behind its payload."""
+"""Fixed bytes of a plain frame before and after its identifier, before and after its payload."""
 Source: TypeAlias = tuple[str, int]
-"""IPv4 address and port that a datagram came from."""
+"""Source IPv4 address and port of a datagram."""
 Decode: TypeAlias = Callable[[bytes, float, Source], Frame | None]
-"""Decodes a datagram, with its time in [s] and its source; None when it is to be dropped."""
+"""Decodes a datagram, with its time in [s] and its source; None to drop it."""
 
 
 class _Reader(ctypes.Structure):
@@ -65,7 +65,7 @@ class _Reader(ctypes.Structure):
 
 
 class DatagramReader:
-    """Reads the datagrams of one bus; :func:`datagram_reader` is the way in."""
+    """Reads the datagrams of one bus; create it by :func:`datagram_reader`."""
 
     def __init__(self, library: ctypes.CDLL, layout: Layout, own: Source) -> None:
         self._state = state = _Reader(offset=WallClock().offset)
@@ -88,7 +88,7 @@ class DatagramReader:
         return int(self._state.lost)
 
     def reopened(self) -> None:
-        """The datagrams come from another socket now, which counts its losses anew."""
+        """Expect the kernel's drop count from 0 again, because another socket was opened."""
         self._state.drops = self._state.error = 0
 
     def receive(
@@ -102,12 +102,12 @@ class DatagramReader:
         """Wait for frames at most timeout [s], and append them to the list.
 
         Args:
-            descriptors: Of the socket, and of the event that ends the waiting.
-            expected: Frames of process data that it waits for, unless another frame comes.
-            decode: Decodes what is no plain frame.
+            descriptors: File descriptors of the socket, and of the event that ends the wait.
+            expected: Number of process data frames to wait for, unless another frame arrives.
+            decode: Decodes datagrams that are not plain frames.
 
         Returns:
-            Number of datagrams, and :data:`WOKEN` beside it when the event has come.
+            Number of datagrams, combined with :data:`WOKEN` if the event was set.
 
         Raises:
             OSError: The socket failed.
@@ -133,9 +133,9 @@ class DatagramReader:
 
 
 def datagram_reader(layout: Layout = (), own: Source = ('', 0)) -> DatagramReader | None:
-    """Return a reader of a bus that sends from an address; None without a compiler.
+    """Return a reader for a bus that sends from an address; None without a compiler.
 
-    Without a layout its datagrams are those of SocketCAN.
+    Without a layout, datagrams have the format of SocketCAN.
     """
     with _loading:
         loaded = library()
@@ -144,7 +144,7 @@ def datagram_reader(layout: Layout = (), own: Source = ('', 0)) -> DatagramReade
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL | None:
-    """Return the compiled receive path, which is built if need be; None where it cannot be."""
+    """Return the compiled receive path, building it if necessary; None if that is not possible."""
     loaded = load_c_library('canopen_core', SOURCE, 'CAN frames are read in Python, slower')
     if loaded is not None:
         pointer, number, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
@@ -169,7 +169,7 @@ _log = logging.getLogger(__name__)
 
 
 def prepare_receiver(sock: socket.socket) -> None:
-    """Raise the receive buffer, and request time stamps and the count of dropped frames."""
+    """Enlarge the receive buffer; enable time stamps and the count of dropped frames."""
     try:
         sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
     except PermissionError:
@@ -180,7 +180,7 @@ def prepare_receiver(sock: socket.socket) -> None:
 
 
 def loss_text(name: str, granted: int) -> str:
-    """Return that frames were lost, and what helps with the granted receive buffer in [byte]."""
+    """Describe a loss of frames, and the remedy for a receive buffer of this size in [byte]."""
     text = f'{name}: frames were lost, because they came faster than this process reads them'
     if granted >= RECEIVE_BUFFER:
         return text
@@ -188,9 +188,9 @@ def loss_text(name: str, granted: int) -> str:
 
 
 class TimestampReader:
-    """Turns ancillary data of received datagrams into steady time and a count of losses.
+    """Converts ancillary data of received datagrams to steady time and a count of losses.
 
-    The kernel stamps with the wall clock. Stamps never go back, also when it is set.
+    The kernel stamps with the wall clock. Results never go back, even if that clock is set.
     """
 
     def __init__(self) -> None:
@@ -201,7 +201,7 @@ class TimestampReader:
         self._clock = WallClock()
 
     def reopened(self) -> None:
-        """The datagrams come from another socket now, which counts its losses anew."""
+        """Expect the kernel's drop count from 0 again, because another socket was opened."""
         self._drops = 0
 
     def begin_batch(self) -> None:
@@ -235,7 +235,7 @@ class SocketBus(Bus):
         sender: socket.socket,
         reader: DatagramReader | None,
     ) -> None:
-        """Read by the compiled reader, or in Python without one."""
+        """Use the compiled reader, or Python without one."""
         super().__init__(name)
         self._receiver, self._sender = receiver, sender
         self._send_lock = RLock()
@@ -255,11 +255,11 @@ class SocketBus(Bus):
 
     @abstractmethod
     def _decode(self, datagram: bytes, stamp: float, source: Source) -> Frame | None:
-        """Return the frame of a datagram; None when it is none of ours to deliver."""
+        """Return the frame of a datagram; None if it must not be delivered."""
 
     @abstractmethod
     def _explain(self, error: OSError) -> BusError:
-        """Explain what a failed system call means for the user, and what to do."""
+        """Explain what a failed system call means for the user, and the remedy."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when there are frames."""
@@ -268,8 +268,8 @@ class SocketBus(Bus):
     def send(self, frame: Frame) -> None:
         """Hand the frame to the kernel.
 
-        A full queue is reported and not waited for: a cyclic frame is outdated by its successor,
-        and a request is repeated by who waits for the answer.
+        A full queue raises an error instead of waiting: a cyclic frame is outdated by its
+        successor, and a client repeats its request after a time-out.
         """
         sent, datagram = self._sent.get(frame.can_id, (None, b''))
         if sent is not frame:  # an axis at rest gets the same one in each cycle
@@ -373,7 +373,7 @@ class SocketBus(Bus):
                 os.eventfd_write(self._wake_fd, 1)
 
     def close(self) -> None:
-        """Close the sockets; a thread that waits in :meth:`receive` ends, and closes them."""
+        """Close the sockets; a thread waiting in :meth:`receive` stops waiting and closes them."""
         with self._use_lock:
             if self._closed:
                 return
@@ -382,7 +382,7 @@ class SocketBus(Bus):
             self._release()
 
     def _release(self) -> None:
-        """Close the descriptors, when no thread is inside a call with one of them."""
+        """Close the descriptors once no thread uses them in a call."""
         if self._receiving:
             return
         with self._send_lock:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""CAN interfaces of the Linux kernel (SocketCAN): which ones there are, and a bus on a raw socket.
+"""CAN interfaces of the Linux kernel (SocketCAN): a list of them, and a bus on a raw socket.
 
-Other sockets of this host see the frames that are sent; the sending bus itself does not.
+Other sockets of this host receive the sent frames; the sending bus itself does not.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _request(probe: socket.socket, request: int, name: str, layout: str) -> int:
 
 
 def missing_interface_text(name: str, existing: dict[str, CanInterface]) -> str:
-    """Explain that an interface does not exist: which do, how to make it, or a similar name."""
+    """Explain that an interface is missing: which exist, how to create it, or a similar name."""
     have = ', '.join(sorted(existing)) or 'none'
     if not is_interface_name(name):
         close = difflib.get_close_matches(name, (*existing, 'can0', 'vcan0', *_OTHER_BUSES), n=1)
@@ -77,12 +77,12 @@ def missing_interface_text(name: str, existing: dict[str, CanInterface]) -> str:
 
 
 def is_interface_name(name: str) -> bool:
-    """Whether a name is one that CAN interfaces usually have: can0, vcan1, slcan0."""
+    """Whether a name looks like a CAN interface: can0, vcan1, slcan0."""
     return bool(_USUAL_NAME.fullmatch(name))
 
 
 def bring_up_text(name: str) -> str:
-    """Return the command that switches an interface on."""
+    """Return the command that brings an interface up."""
     if name.startswith('vcan'):
         return f'`ip link set up {name}`'
     return f'`ip link set up {name} type can bitrate 1000000` (with the bit rate of your bus)'
@@ -114,7 +114,7 @@ class SocketCanBus(SocketBus):
         self._gone = False
 
     def _receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; an interface that went away is opened again when it is back."""
+        """Wait for frames; reopen a removed interface when it is back."""
         if self._gone:
             self._reopen()
         return super()._receive(timeout)
@@ -224,7 +224,7 @@ def _check_interface(name: str) -> None:
 
 
 def no_can_text(name: str, error: OSError) -> str:
-    """Explain that the kernel has no CAN, and what works without it."""
+    """Explain that the kernel has no CAN support, and which buses work without it."""
     return (
         f'this kernel has no CAN, so {name} cannot be opened ({error.strerror or error}); '
         'try `modprobe can_raw`, or take the bus udp_multicast, which needs no kernel support'
@@ -232,7 +232,7 @@ def no_can_text(name: str, error: OSError) -> str:
 
 
 def failure_text(name: str, error: OSError) -> str:
-    """Explain what a failed system call on an open interface means, and what to do."""
+    """Explain what a failed system call on an open interface means, and the remedy."""
     if error.errno == errno.ENETDOWN:
         return f'CAN interface {name} is down; {bring_up_text(name)}'
     if error.errno in (errno.ENODEV, errno.ENXIO):

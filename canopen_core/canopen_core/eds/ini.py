@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The text of EDS and DCF files: sections with their lines, and values (CiA 306-1, 4.2, 4.6.3).
 
-Services and command lines write values in the same way. Takes what vendors' files hold: any case,
-blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text, comments with ``;`` or ``#``. Odd lines
-are reported and skipped, never fatal.
+Services and command lines use the same syntax for values. Tolerates vendors' files: any case,
+blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text, comments with ``;`` or ``#``. Invalid
+lines are reported and skipped, never fatal.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ class IniSection:
     values: dict[str, IniValue] = field(default_factory=dict)  # values by lower-case key
 
     def text(self, key: str) -> str:
-        """Return the text of a lower-case key, empty when it is missing or empty."""
+        """Return the text of a lower-case key; empty if it is missing."""
         value = self.values.get(key)
         return value.text if value is not None else ''
 
     def line_of(self, key: str) -> int:
-        """Return the line of a key, that of the section when it is missing."""
+        """Return the line number of a key, or of the section if the key is missing."""
         value = self.values.get(key)
         return value.line if value is not None else self.line
 
@@ -68,7 +68,7 @@ class IniFile:
     oddities: list[tuple[int, str, str]] = field(default_factory=list)
 
     def odd(self, line: int, message: str, section: str = '') -> None:
-        """Report what was skipped or guessed."""
+        """Add a warning about skipped or guessed content."""
         self.oddities.append((line, section, message))
 
 
@@ -84,7 +84,7 @@ def decode_text(data: bytes) -> str:
 
 
 def _utf_16(data: bytes) -> str:
-    """Name the UTF-16 encoding of a text whose every other byte is 0."""
+    """Return the UTF-16 encoding of a text in which every other byte is 0."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return 'utf-16'
     head = data[:NUL_SAMPLE]
@@ -95,12 +95,12 @@ def _utf_16(data: bytes) -> str:
 
 
 def section_name(title: str) -> str:
-    """Return the name by which a section is found: ``1018 Sub1`` is ``1018sub1``."""
+    """Return the normalized name of a section: ``1018 Sub1`` becomes ``1018sub1``."""
     return ''.join(title.split()).lower()
 
 
 def read_ini(text: str) -> IniFile:
-    """Split a text into sections; nothing in it can make this fail."""
+    """Split a text into sections; never raises."""
     result = IniFile()
     section: IniSection | None = None
     # only these end a line: str.splitlines() would also split at form feeds inside a name
@@ -150,17 +150,17 @@ BOOLEAN_WORDS = {'true': True, 'false': False}
 
 @dataclass(frozen=True, slots=True)
 class EdsValue:
-    """A value as an EDS gives it."""
+    """A parsed value of an EDS."""
 
     value: Value  # the value; of a sum with ``$NODEID`` all but the node id
     node_relative: bool = False  # the node id is to be added
 
 
 def parse_integer(text: str) -> int:
-    """Read a decimal (leading zeros allowed) or hexadecimal number, before a comment (``;``).
+    """Read a decimal (leading zeros allowed) or hexadecimal number, up to a comment (``;``).
 
     Raises:
-        ValueError: It is no whole number.
+        ValueError: The text is not an integer.
     """
     text = text.partition(';')[0].strip()
     if len(text) > INTEGER_DIGITS_MAX or not INTEGER.fullmatch(text):
@@ -170,10 +170,10 @@ def parse_integer(text: str) -> int:
 
 
 def parse_value(data_type: DataType, text: str) -> EdsValue | None:
-    """Read a DefaultValue, ParameterValue or limit; None of an empty text and of a DOMAIN.
+    """Read a DefaultValue, ParameterValue or limit; None for an empty text and for a DOMAIN.
 
     Raises:
-        ValueError: The text is no value of this type.
+        ValueError: The text is not a value of this type.
     """
     if not text or data_type is DataType.DOMAIN:
         return None
@@ -225,7 +225,7 @@ def _real(data_type: DataType, text: str) -> float:
 
 
 def _unicode_string(text: str) -> str:
-    """Read UTF-16 as hexadecimal digits, as the standard wants it, or as plain text."""
+    """Read UTF-16 as hexadecimal digits, as in the standard, or as plain text."""
     try:
         return bytes.fromhex(text).decode('utf-16-be')
     except (ValueError, UnicodeDecodeError):
@@ -241,11 +241,11 @@ def _time(data_type: DataType, text: str) -> bytes:
 
 
 BYTE_TYPES = frozenset({DataType.DOMAIN, DataType.OCTET_STRING, *TIME_BITS})
-"""Types whose text is hexadecimal bytes."""
+"""Types written as hexadecimal bytes."""
 
 
 def text_from_bytes(data_type: DataType, data: bytes) -> str:
-    """Write the bytes of an SDO as text: a number, true or false, a string, or hexadecimal bytes.
+    """Format the bytes of an SDO as text: a number, true or false, a string, or hexadecimal.
 
     Raises:
         CodecError: The bytes do not fit the type.
@@ -257,12 +257,12 @@ def text_from_bytes(data_type: DataType, data: bytes) -> str:
 
 
 def bytes_from_text(data_type: DataType, text: str) -> bytes:
-    """Read a value from text; the inverse of :func:`text_from_bytes`.
+    """Parse text into the bytes of an SDO; the inverse of :func:`text_from_bytes`.
 
-    Whole numbers may be hexadecimal, with ``0x``.
+    Integers may be hexadecimal, with ``0x``.
 
     Raises:
-        CodecError: The text is no value of this type.
+        CodecError: The text is not a value of this type.
     """
     if data_type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
         return encode(data_type, text)

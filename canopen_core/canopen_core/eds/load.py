@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading EDS and DCF files (CiA 306-1), tolerant of what vendors ship.
+"""Reads EDS and DCF files (CiA 306-1), tolerant of errors in vendors' files.
 
 The sections of a file become the entries of an object dictionary (CiA 306-1, 4.6).
 """
@@ -48,7 +48,7 @@ class Eds:
 
 
 def load_eds(path: str | os.PathLike[str]) -> Eds:
-    """Read an EDS or DCF file; oddities are its warnings.
+    """Read an EDS or DCF file; tolerated errors become warnings.
 
     Raises:
         ConfigError: The file is missing, unreadable or has no objects.
@@ -86,7 +86,7 @@ def _node_id(ini: IniFile) -> int | None:
 
 
 def _dummy_types(ini: IniFile) -> frozenset[int]:
-    """Read [DummyUsage]; files without it are taken to allow all (many just leave it out)."""
+    """Read [DummyUsage]; a file without it allows all types, as many files omit it."""
     section = ini.sections.get('dummyusage')
     if section is None:
         return frozenset(DUMMY_TYPES)
@@ -117,7 +117,7 @@ COLLECTIONS = (ObjectCode.ARRAY, ObjectCode.RECORD, ObjectCode.DEFSTRUCT)
 
 
 class ObjectReader:
-    """Reads all objects of one file; its oddities get what is skipped or guessed."""
+    """Reads all objects of one file; ``oddities`` receives skipped or guessed content."""
 
     def __init__(self, ini: IniFile) -> None:
         self._ini = ini
@@ -168,7 +168,7 @@ class ObjectReader:
             return ObjectCode.VAR
 
     def _compact(self, index: int, section: IniSection, count: int) -> Iterator[ObjectEntry]:
-        """Write out an array that CompactSubObj abbreviates (CiA 306-1, 4.6.3.2)."""
+        """Expand an array abbreviated by CompactSubObj (CiA 306-1, 4.6.3.2)."""
         if not 0 < count <= COMPACT_SUBINDICES_MAX:
             self._odd(section, 'compactsubobj', f'CompactSubObj {count} is not 1 to 254')
             return
@@ -267,7 +267,7 @@ class ObjectReader:
             return default
 
     def _compact_pdos(self) -> Iterator[ObjectEntry]:
-        """Write out the PDOs that CompactPDO abbreviates (CiA 306-1, 4.5.2).
+        """Expand the PDOs abbreviated by CompactPDO (CiA 306-1, 4.5.2).
 
         Bit 0 stands for sub-index 1 of each communication parameter, and so on.
         """
@@ -283,9 +283,9 @@ class ObjectReader:
                     yield from _compact_mapping(mapping + number)
 
     def _check_lists(self, compact: set[int]) -> None:
-        """Report objects of the three lists that have no section, which compact ones do not need.
+        """Report listed objects without a section, except compact ones, which need none.
 
-        Files of which a part is missing look like that.
+        Such entries suggest that a part of the file is missing.
         """
         listed = {
             self._number(section, key, 0)
@@ -302,7 +302,7 @@ class ObjectReader:
 
 
 def _compact_parameters(index: int, base: int, number: int, mask: int) -> Iterator[ObjectEntry]:
-    """Yield a communication parameter with the sub-indices of a mask."""
+    """Yield a communication parameter with the sub-indices set in a mask."""
     predefined = number < PREDEFINED_MAX
     highest = min(mask.bit_length(), len(PDO_PARAMETERS))
     u8, constant = DataType.UNSIGNED8, AccessType.CONSTANT
@@ -322,7 +322,7 @@ def _compact_parameters(index: int, base: int, number: int, mask: int) -> Iterat
 
 
 def _compact_mapping(index: int) -> Iterator[ObjectEntry]:
-    """Yield a mapping parameter that maps nothing."""
+    """Yield an empty mapping parameter."""
     yield ObjectEntry(index, 0, 'Number of mapped objects', DataType.UNSIGNED8, default=0)
     for subindex in range(1, COMPACT_MAPPING + 1):
         name = f'Application object {subindex}'

@@ -89,12 +89,12 @@ def integer_range(data_type: DataType) -> tuple[int, int] | None:
 
 
 def encode(data_type: DataType, value: Value) -> bytes:
-    """Encode a value as SDOs carry it (CiA 301, 7.1.4): little-endian, of the type's length.
+    """Encode a value for an SDO (CiA 301, 7.1.4): little-endian, with the length of its type.
 
-    Strings are str, octet strings, times and domains are bytes.
+    Strings are str; octet strings, times and domains are bytes.
 
     Raises:
-        CodecError: The value is of another kind or outside the type's range.
+        CodecError: The value has the wrong Python type, or is out of range.
     """
     if data_type in REAL_FORMATS:
         return _encode_real(data_type, value)
@@ -201,7 +201,7 @@ class MappedObject:
 
 
 def mapped_place(word: int) -> tuple[int, int, int]:
-    """Return index, sub-index and length in [bit] that an entry of a mapping object names."""
+    """Return index, sub-index and length in [bit] from an entry of a mapping object."""
     return word >> 16, word >> 8 & 0xFF, word & MAPPED_LENGTH_MASK
 
 
@@ -216,7 +216,7 @@ class PdoCodec:
         """Compile the mapping.
 
         Raises:
-            CodecError: The objects are longer than 64 bits together, or one has no fixed length.
+            CodecError: The objects exceed 64 bits in total, or one has no fixed length.
         """
         self.objects = tuple(objects)  # the mapped objects in their order
         for entry in self.objects:

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The object dictionary as a description (CiA 301, 7.4): what a device has, not what it holds.
+"""The object dictionary of a device (CiA 301, 7.4): descriptions of objects, not present values.
 
-People name an object by its number or by the names of the EDS:
+Users name an object by its number or by its name in the EDS:
 
 ========================================  =======================================
 ``0x6041``, ``6041``                      a VAR, or sub-index 0
 ``0x607D:02``, ``0x607D:2``               a sub-index
 ``Statusword``                            by name, in upper or lower case
 ``Software position limit/Max position``  a sub-index by the names of record and entry,
-                                          which may be shortened as long as they are clear
+                                          which may be shortened as long as unambiguous
 ========================================  =======================================
 """
 
@@ -28,7 +28,7 @@ from .objects import AXES_MAX, AXIS_OFFSET, Index
 
 
 def object_address(index: int, subindex: int | None = None) -> str:
-    """Return an object as every message names it: ``0x607D:02``, or ``0x607D`` for the whole."""
+    """Return the address of an object for messages: ``0x607D:02``, or ``0x607D`` as a whole."""
     return f'0x{index:04X}' if subindex is None else f'0x{index:04X}:{subindex:02X}'
 
 
@@ -109,7 +109,7 @@ class ObjectEntry:
         )
 
     def __str__(self) -> str:
-        """Name the object as a person would: ``0x6041:00 Statusword``."""
+        """Return address and name: ``0x6041:00 Statusword``."""
         return f'{object_address(self.index, self.subindex)} {self.name}'
 
 
@@ -123,7 +123,7 @@ class ObjectDictionary:
         source: str = 'object dictionary',
         node_id: int | None = None,
     ) -> None:
-        """Collect the entries; of two with one address the later counts."""
+        """Collect the entries; of two with the same address the later one is used."""
         self.source = source  # where it was read from, for messages
         self.node_id = node_id  # node id for which its COB-IDs are, None where no file says that
         ordered = sorted(entries, key=lambda entry: entry.address)
@@ -145,11 +145,11 @@ class ObjectDictionary:
         return address in self._entries
 
     def get(self, index: int, subindex: int = 0) -> ObjectEntry | None:
-        """Return the entry, or None when the device has no such object."""
+        """Return the entry, or None if the device has no such object."""
         return self._entries.get((index, subindex))
 
     def number(self, index: int, subindex: int = 0) -> int | None:
-        """Return the default of an object, None where it has none or no whole number."""
+        """Return the integer default of an object; None if it has none."""
         entry = self.get(index, subindex)
         return entry.default if entry is not None and isinstance(entry.default, int) else None
 
@@ -162,7 +162,7 @@ class ObjectDictionary:
         return list(self._by_index.get(index, ()))
 
     def is_configured(self, *indices: int) -> bool:
-        """Return whether a DCF gives any writable sub-index of some objects its own value."""
+        """Return whether a DCF sets a value for any writable sub-index of these objects."""
         return any(
             entry.configured and entry.access.writable
             for index in indices
@@ -172,8 +172,8 @@ class ObjectDictionary:
     def for_node(self, node_id: int) -> ObjectDictionary:
         """Return a copy whose node-relative defaults are resolved for a node id.
 
-        A COB-ID of the pre-defined connection set that the file writes for another node id, or
-        without any, is that of this node id, too.
+        A COB-ID of the pre-defined connection set is converted to this node id, even if the file
+        gives it for another node id or for none.
         """
         return ObjectDictionary(
             (self._resolved(entry, node_id) for entry in self), source=self.source, node_id=node_id
@@ -195,7 +195,7 @@ PROFILE_MASK = 0xFFFF  # bits of 0x1000 that hold the number of the profile (CiA
 
 
 class DeviceProfile(IntEnum):
-    """Numbers of profiles whose objects are known here."""
+    """Numbers of the supported device profiles."""
 
     GENERIC_IO = 401
     DRIVE = 402
@@ -203,12 +203,12 @@ class DeviceProfile(IntEnum):
 
 
 def profile_number(dictionary: ObjectDictionary) -> int:
-    """Return the number of the profile that the EDS names; 0 when it names none."""
+    """Return the profile number of the EDS; 0 if it names none."""
     return (dictionary.number(Index.DEVICE_TYPE) or 0) & PROFILE_MASK
 
 
 def is_drive(dictionary: ObjectDictionary) -> bool:
-    """Return whether 0x6040 and its like are those of CiA 402; other profiles have them, too."""
+    """Return whether 0x6040 etc. are objects of CiA 402; other profiles reuse the indices."""
     number = profile_number(dictionary)
     if number:
         return number == DeviceProfile.DRIVE
@@ -230,10 +230,10 @@ SIMILAR_MAX = 4
 
 
 def find_object(dictionary: ObjectDictionary, path: str) -> ObjectEntry:
-    """Find an object by number or name, as the module describes.
+    """Find an object by number or name; the module docstring describes the syntax.
 
     Raises:
-        ObjectError: There is none, or there are several; the message names the candidates.
+        ObjectError: No object or several match; the message names the candidates.
     """
     number = NUMBER.fullmatch(path.strip())
     if number is not None:
@@ -242,7 +242,7 @@ def find_object(dictionary: ObjectDictionary, path: str) -> ObjectEntry:
 
 
 def object_path(entry: ObjectEntry) -> str:
-    """Return the name by which an object is found."""
+    """Return the name by which :func:`find_object` finds an object."""
     return f'{entry.record}/{entry.name}' if entry.record else entry.name
 
 
@@ -284,7 +284,7 @@ def _words(path: str) -> str:
 
 
 def _begins(name: str, wanted: str) -> bool:
-    """Whether each part of the wanted name begins that of a name, a lone part any of them."""
+    """Whether each part of a name begins with the wanted part; a single part matches any."""
     parts, begins = name.split('/'), wanted.split('/')
     if len(begins) == 1:
         return any(part.startswith(wanted) for part in parts)

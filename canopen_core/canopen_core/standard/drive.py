@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Device profiles: states, words and modes of drives (CiA 402-2, clauses 6 to 8), and I/O objects.
 
-I/O modules are those of CiA 401, encoders those of CiA 406 with one channel.
+I/O modules follow CiA 401, encoders CiA 406 with one channel.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class DriveState(IntEnum):
 
 
 class Controlword(IntFlag):
-    """Bits of 0x6040 (CiA 402-2, table 25); those from 4 to 6 and 9 are named by their mode."""
+    """Bits of 0x6040 (CiA 402-2, table 25); bits 4 to 6 and 9 depend on the mode."""
 
     SWITCH_ON = 1 << 0
     ENABLE_VOLTAGE = 1 << 1
@@ -52,7 +52,7 @@ class Controlword(IntFlag):
 
 
 class Statusword(IntFlag):
-    """Bits of 0x6041 (CiA 402-2, table 30); bits 12 and 13 are named by their mode."""
+    """Bits of 0x6041 (CiA 402-2, table 30); bits 12 and 13 depend on the mode."""
 
     READY_TO_SWITCH_ON = 1 << 0
     SWITCHED_ON = 1 << 1
@@ -101,7 +101,7 @@ _STATE_BY_LOW_BITS = tuple(_decode_state(word) for word in range(0x80))
 
 
 def drive_state(statusword: int) -> DriveState:
-    """Return the state that a statusword shows, UNKNOWN when no row of the table fits."""
+    """Return the state in a statusword; UNKNOWN if no row of the table matches."""
     return _STATE_BY_LOW_BITS[statusword & 0x7F]
 
 
@@ -131,7 +131,7 @@ class OperationMode(IntEnum):
 
 
 def mode_title(number: int) -> str:
-    """Name a mode, also one that the standard does not know (vendor modes are negative)."""
+    """Return the name of a mode, also of one outside the standard (vendor modes are negative)."""
     try:
         return OperationMode(number).title
     except ValueError:
@@ -186,7 +186,7 @@ CYCLIC_MODES = frozenset(
         OperationMode.CYCLIC_TORQUE,
     }
 )
-"""Modes whose targets come with every SYNC (CiA 402-2, clauses 12 to 16)."""
+"""Modes that take a target with every SYNC (CiA 402-2, clauses 12 to 16)."""
 
 
 class EncoderObject(IntEnum):
@@ -206,8 +206,8 @@ ANALOG_EVENTS = 0x6423  # analogue input global interrupt enable
 class IoGroup:
     """Inputs or outputs of one kind.
 
-    A module has the same digital channels in objects of 8, 16 or 32 bits, which begin at
-    ``indices``; sub-index 0 is their number. Analogue channels have an index for each width.
+    A module offers the same digital channels as objects of 8, 16 or 32 bits, which begin at
+    ``indices``; sub-index 0 is their number. Analogue channels have one index per width.
     """
 
     name: str  # as in ``digital_inputs``
@@ -217,13 +217,13 @@ class IoGroup:
 
     @property
     def direction(self) -> str:
-        """Key of bus.yml below which its PDOs stand."""
+        """Key of bus.yml that contains its PDOs."""
         return 'rpdo' if self.is_output else 'tpdo'
 
     def entries(
         self, dictionary: ObjectDictionary, mapped: Container[tuple[int, int]] = ()
     ) -> Sequence[ObjectEntry]:
-        """Return the channels of a module; of several widths, the one that PDOs carry."""
+        """Return the channels of a module; among several widths, those mapped into PDOs."""
         widths = [
             [entry for entry in dictionary.subindices(index) if entry.subindex]
             for index in self.indices
@@ -249,4 +249,4 @@ IO_GROUPS = (
     IoGroup('analog_outputs', (0x6410, 0x6411, 0x6412, 0x6413), is_output=True, is_digital=False),
 )
 ERROR_OBJECTS = {0x6200: (0x6206, 0x6207), 0x6411: (0x6443, 0x6444)}
-"""Of outputs: error mode (which ones change on a loss), and the value that these get."""
+"""Error mode of outputs (which ones change when the master is lost), and their error values."""

@@ -34,7 +34,7 @@ class NmtState(IntEnum):
 
 
 class ConsumerHeartbeatTime(NamedTuple):
-    """An entry of 0x1016: whose heartbeat is awaited, and how long (CiA 301, 7.5.2.17)."""
+    """An entry of 0x1016: monitored node, and its heartbeat time-out (CiA 301, 7.5.2.17)."""
 
     node_id: int  # node id of the producer, bits 16 to 23
     time_ms: int  # time after which it counts as lost in [ms], bits 0 to 15
@@ -51,7 +51,7 @@ class ConsumerHeartbeatTime(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether it awaits a node; an entry without a time or a node id is not used."""
+        """Whether it monitors a node; an entry without a time or a node id is unused."""
         return bool(self.time_ms) and NODE_ID_MIN <= self.node_id <= NODE_ID_MAX
 
 
@@ -74,7 +74,7 @@ def nmt_frame(command: NmtCommand, node_id: int = ALL_NODES) -> bytes:
 
 
 def parse_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
-    """Return command and node id (0 for all) of an NMT frame, None when it is none."""
+    """Return command and node id (0 for all) of an NMT frame; None if it is invalid."""
     if len(data) != 2:
         return None
     try:
@@ -84,12 +84,12 @@ def parse_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
 
 
 def nmt_addressee(node_id: int) -> str:
-    """Return the addressee of an NMT command in words."""
+    """Describe the addressee of an NMT command."""
     return 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
 
 
 def parse_heartbeat(data: bytes) -> NmtState | None:
-    """Return the state in a heartbeat or boot-up frame, None when it is none.
+    """Return the state in a heartbeat or boot-up frame; None if it is invalid.
 
     Bit 7 (the toggle bit of node guarding) is ignored.
     """
@@ -116,12 +116,12 @@ CAN_ID_MASK = 0x7FF  # 11-bit identifier
 BIT_RATES_KBIT = (10, 20, 50, 100, 125, 250, 500, 800, 1000)
 """Bit rates in [kbit/s], as bus.yml and EDS files (``BaudRate_...``) name them.
 
-Newer issues of the standard reserve 100 kbit/s, which older devices have.
+Newer issues of the standard reserve 100 kbit/s, which older devices support.
 """
 
 
 class CobId(IntEnum):
-    """Function codes as the COB-ID of node 0."""
+    """Function codes, each as the COB-ID for node 0."""
 
     NMT = 0x000
     SYNC = 0x080
@@ -139,14 +139,14 @@ PREDEFINED: dict[tuple[int, int], int] = {
     **{(0x1400 + n, 1): CobId.RPDO1 + 0x100 * n for n in range(PREDEFINED_MAX)},
     **{(0x1800 + n, 1): CobId.TPDO1 + 0x100 * n for n in range(PREDEFINED_MAX)},
 }
-"""Function code of the COB-IDs that devices may change, by index and sub-index."""
+"""Function code of each configurable COB-ID, by index and sub-index."""
 
 
 def _pdo_default(first: CobId, number: int, node_id: int) -> int:
-    """Return the pre-defined COB-ID of PDO 1 to 4 of a node; the first is that of its direction.
+    """Return the pre-defined COB-ID of PDO 1 to 4 of a node; ``first`` gives the direction.
 
     Raises:
-        ValueError: The number is not 1 to 4; others have no pre-defined identifier.
+        ValueError: The number is not 1 to 4; other PDOs have no pre-defined identifier.
     """
     if not 1 <= number <= PREDEFINED_MAX:
         raise ValueError(f'PDO {number} has no pre-defined COB-ID; only PDOs 1 to 4 have one')
@@ -161,9 +161,9 @@ def own_cob_id(
 ) -> int:
     """Return the COB-ID of a device whose file may give that of another node id.
 
-    Many EDS files leave out ``$NODEID``, and a DCF may have been made for another device: of the
-    pre-defined connection set a device has the identifier that its own node id gives. A file
-    that names no node id has None.
+    Many EDS files leave out ``$NODEID``, and a DCF may be written for another device. In the
+    pre-defined connection set, a device uses the identifier of its own node id. ``file_node_id``
+    is None if the file names none.
     """
     base = PREDEFINED.get(address)
     if base is None or cob_id & COB_ID_EXTENDED:
@@ -183,10 +183,10 @@ MILLISECONDS_MASK = 0x0FFF_FFFF  # the upper four bits are reserved
 
 
 def encode_time_of_day(moment: datetime) -> bytes:
-    """Return the 6 bytes of a moment, to the millisecond.
+    """Encode a date and time in 6 bytes, to the millisecond.
 
     Raises:
-        CodecError: It is before 1984 or after 2163.
+        CodecError: The date is before 1984 or after 2163.
     """
     elapsed = moment - EPOCH
     milliseconds = elapsed.seconds * 1000 + elapsed.microseconds // 1000
@@ -197,10 +197,10 @@ def encode_time_of_day(moment: datetime) -> bytes:
 
 
 def decode_time_of_day(data: bytes) -> datetime:
-    """Return the moment in 6 bytes; the time zone is that of the network, UTC by default.
+    """Decode date and time from 6 bytes; the time zone is that of the network, UTC by default.
 
     Raises:
-        CodecError: It has not 6 bytes.
+        CodecError: The data are not 6 bytes.
     """
     if len(data) != TIME_OF_DAY.size:
         raise CodecError(f'no time of day: it has 6 bytes, got {len(data)}')
@@ -371,7 +371,7 @@ class Emergency:
 
     @property
     def is_reset(self) -> bool:
-        """The message reports that an error is gone (CiA 301, 7.2.7.1); others may remain."""
+        """Whether the message says that an error is gone (CiA 301, 7.2.7.1); others may remain."""
         return self.code >> 8 == 0
 
     def encode(self) -> bytes:
@@ -390,7 +390,7 @@ class Emergency:
         return cls(*struct.unpack('<HB5s', data))
 
     def __str__(self) -> str:
-        """Describe it."""
+        """Describe the message."""
         vendor = f', vendor {self.vendor.hex()}' if any(self.vendor) else ''
         register = error_register_text(self.register)
         remain = '; others remain' if self.is_reset and self.register else ''

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Indices of the objects that master and devices deal with by name (CiA 301, 7.5.2; CiA 402-2)."""
+"""Indices of the objects that master and devices use by name (CiA 301, 7.5.2; CiA 402-2)."""
 
 from __future__ import annotations
 
@@ -129,9 +129,9 @@ COMMANDS = frozenset(
         Index.INTERPOLATION_DATA,
     }
 )
-"""Objects of the first axis of a drive by which it is commanded in each cycle."""
+"""Objects of a drive's first axis that command it in each cycle."""
 OFFSETS = frozenset({Index.POSITION_OFFSET, Index.VELOCITY_OFFSET, Index.TORQUE_OFFSET})
-"""Objects of the first axis of a drive that are added to its targets."""
+"""Objects of a drive's first axis that are added to its targets."""
 
 SLOW_WRITES: dict[int, float] = {
     Index.STORE_PARAMETERS: 10.0,
@@ -140,11 +140,11 @@ SLOW_WRITES: dict[int, float] = {
     Index.PROGRAM_DATA: 60.0,
     Index.PROGRAM_CONTROL: 60.0,
 }
-"""Objects whose write a device answers when it has erased and written flash memory, and how long
-that takes at most in [s] (CiA 301, 7.5.2.13 and 7.5.2.14; CiA 302-3)."""
+"""Objects whose write a device acknowledges only after writing flash memory, and the longest time
+for that in [s] (CiA 301, 7.5.2.13 and 7.5.2.14; CiA 302-3)."""
 SETTINGS = (range(0x1000, 0x1F00), range(0x6000, 0xA000))
-"""Objects of the standards, which are settings that may be written twice (CiA 301, table 10); what
-a write of others starts, only the vendor knows."""
+"""Objects of the standards: settings that may safely be written twice (CiA 301, table 10). What a
+write of other objects triggers, only the vendor knows."""
 
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
@@ -184,7 +184,7 @@ class PdoObject(NamedTuple):
 
 
 def pdo_object(index: int) -> PdoObject | None:
-    """Return which PDO an object is a parameter of (CiA 301, 7.5.2.35 to 7.5.2.38), if of any."""
+    """Return the PDO that an object parameterizes (CiA 301, 7.5.2.35 to 7.5.2.38), or None."""
     kind, offset = divmod(index - Index.RPDO_COMMUNICATION, PDO_COUNT_MAX)
     if not 0 <= kind < 4:
         return None
@@ -192,7 +192,7 @@ def pdo_object(index: int) -> PdoObject | None:
 
 
 def axis_of(index: int) -> tuple[int, int]:
-    """Return the index of the same object of the first axis, and the number of the axis from 0."""
+    """Return the index of the same object in the first axis, and the axis number from 0."""
     axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
     return (_PROFILE_AREA + offset, axis) if 0 <= axis < AXES_MAX else (index, 0)
 
@@ -203,12 +203,12 @@ def is_signed(index: int, subindex: int) -> bool:
 
 
 def slow_timeout(index: int, usual: float) -> float:
-    """Return how long a device may take to write an object in [s]; usually it may take usual."""
+    """Return the time-out for writing an object in [s]; ``usual``, unless the object is slow."""
     return max(usual, SLOW_WRITES.get(index, 0.0))
 
 
 def is_setting(index: int) -> bool:
-    """Return whether an object may be written twice."""
+    """Return whether an object may safely be written twice."""
     return (
         any(index in area for area in SETTINGS)
         and index not in SLOW_WRITES
@@ -217,10 +217,10 @@ def is_setting(index: int) -> bool:
 
 
 def is_state(index: int) -> bool:
-    """Return whether an object shows how one of the axes of a drive is, as the cycle reads it."""
+    """Return whether an object is a state of any drive axis that the cycle reads."""
     return axis_of(index)[0] in _STATE
 
 
 def is_controlword(index: int) -> bool:
-    """Return whether an object is the controlword of one of the axes of a drive."""
+    """Return whether an object is the controlword of any drive axis."""
     return axis_of(index)[0] == Index.CONTROLWORD

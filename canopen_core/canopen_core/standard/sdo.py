@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """SDO frames and abort codes (CiA 301, 7.2.4.3), for client and server alike.
 
-Each message is a value with ``encode()``; ``decode_request`` reads what a client sent,
-``decode_response`` what a server sent. Both refuse the block protocol (7.2.4.3.9), whose frames
-are made by functions of their own.
-Some servers leave out the unused bytes of a frame, or answer with four bytes for a smaller object:
-``decode_response`` and ``fitted`` read those alike for the master, the tools and the monitor.
+Each message is a value with ``encode()``; ``decode_request`` reads frames of a client,
+``decode_response`` those of a server. Both refuse the block protocol (7.2.4.3.9), which has
+functions of its own.
+Some servers leave out the unused bytes of a frame, or answer with four bytes for a smaller object;
+``decode_response`` and ``fitted`` accept both.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SEGMENT_MAX = 7  # [byte]
 
 @dataclass(frozen=True, slots=True)
 class _Initiate:
-    """Begin of a transfer: expedited when ``data`` is given, else segmented."""
+    """Start of a transfer: expedited if ``data`` is given, else segmented."""
 
     index: int
     subindex: int
@@ -45,7 +45,7 @@ class _Initiate:
         """Return the 8 bytes of the frame.
 
         Raises:
-            CodecError: Expedited data have not 1 to 4 bytes.
+            CodecError: Expedited data are not 1 to 4 bytes long.
         """
         command, indicated = self.specifier, self.size is not None
         if self.data is None:
@@ -84,7 +84,7 @@ class _Address:
 
 
 class DownloadResponse(_Address):
-    """A write was initiated or, if expedited, done."""
+    """Acknowledges the start of a write or, if expedited, the whole write."""
 
     __slots__ = ()
     specifier = 0x60
@@ -136,7 +136,7 @@ class UploadSegmentRequest(_Toggle):
 
 
 class DownloadSegmentResponse(_Toggle):
-    """A segment of a write was taken."""
+    """Acknowledges a segment of a write."""
 
     __slots__ = ()
     specifier = 0x20
@@ -144,7 +144,7 @@ class DownloadSegmentResponse(_Toggle):
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """Either side ends the transfer."""
+    """Aborts the transfer; sent by either side."""
 
     index: int
     subindex: int
@@ -178,7 +178,7 @@ def _decode_segment(data: bytes) -> Segment:
 
 
 def _padded(data: bytes) -> bytes:
-    """Return a frame of a server with the unused bytes that it may have left out."""
+    """Return a frame of a server, padded with unused bytes that it may have left out."""
     if not data or len(data) > FRAME_BYTES or len(data) < _used_bytes(data[0]):
         raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
     if data[0] >> 5 == 2 and data[0] & 0x03 == 0x02:  # the frame's length is that of the value
@@ -187,7 +187,7 @@ def _padded(data: bytes) -> bytes:
 
 
 def _used_bytes(command: int) -> int:
-    """Return how many bytes of an answer carry something, by its command byte."""
+    """Return the number of used bytes of a response, from its command byte."""
     match command >> 5:
         case 0:  # a segment of an upload
             return 1 + SEGMENT_MAX - (command >> 1 & 0x07)
@@ -203,9 +203,9 @@ def _used_bytes(command: int) -> int:
 
 
 def fitted(data_type: DataType, data: bytes) -> bytes:
-    """Return the value of an expedited upload without the bytes behind those of its type.
+    """Return the value of an expedited upload, cut to the length of its type.
 
-    Servers that leave out the size, or give it as four bytes, send four for a smaller object.
+    Servers that omit the size, or always state four bytes, send four for a smaller object.
     """
     size = byte_length(data_type)
     return data[:size] if size is not None and size < len(data) <= EXPEDITED_MAX else data
@@ -215,7 +215,7 @@ def decode_request(data: bytes) -> Request:
     """Read a frame from a client.
 
     Raises:
-        CodecError: It has not 8 bytes or its command specifier is unknown.
+        CodecError: The frame is not 8 bytes long, or its command specifier is unknown.
     """
     if len(data) != FRAME_BYTES:
         raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
@@ -237,7 +237,7 @@ def decode_response(data: bytes) -> Response:
     """Read a frame from a server.
 
     Raises:
-        CodecError: Bytes are missing, or its command specifier is unknown.
+        CodecError: Bytes are missing, or the command specifier is unknown.
     """
     data = _padded(data)
     match data[0] >> 5:
@@ -274,18 +274,18 @@ def checksum(data: bytes) -> int:
 
 
 def unused_bytes(size: int) -> int:
-    """Return how many bytes of the last segment carry no data, of a value of so many bytes."""
+    """Return the number of unused bytes in the last segment of a value of this size in [byte]."""
     return -size % SEGMENT_BYTES if size else SEGMENT_BYTES
 
 
 def end_frame(command: int, data: bytes, *, with_crc: bool) -> bytes:
-    """Return `DOWNLOAD_END` or `UPLOAD_END` for all data, with their checksum where agreed."""
+    """Return `DOWNLOAD_END` or `UPLOAD_END` for all data, with a checksum if agreed."""
     crc = checksum(data) if with_crc else 0
     return struct.pack('<BH5x', command | unused_bytes(len(data)) << 2, crc)
 
 
 def block_frames(data: bytes, position: int, segments: int) -> list[bytes]:
-    """Return the segments of the next block; the other side has the data up to position."""
+    """Return the segments of the next block; the other side has the data before ``position``."""
     frames = []
     for number in range(1, segments + 1):
         start = position + (number - 1) * SEGMENT_BYTES
@@ -298,12 +298,12 @@ def block_frames(data: bytes, position: int, segments: int) -> list[bytes]:
 
 
 class CodeWithText(IntEnum):
-    """Codes, each with its meaning as ``text``."""
+    """Enum of codes, each with its meaning as ``text``."""
 
     text: str
 
     def __new__(cls, code: int, text: str = '') -> Self:
-        """Make a member of a row; a member by its code alone has the text of its row."""
+        """Create a member from code and text; a lookup needs the code only."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.text = text
