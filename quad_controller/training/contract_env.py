@@ -115,7 +115,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode at the present set-points, at a random gait phase."""
+        """Begin an episode at the set-points of the environment, at a random gait phase."""
         _, info = self.simulation.reset(seed=seed, options=options)
         start = tuple(self.simulation.robot.joint_targets.tolist())
         self._runner.reset(start)

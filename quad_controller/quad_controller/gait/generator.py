@@ -168,7 +168,7 @@ class GaitGenerator:
         self.velocity = self.limits.approach(self.velocity, goal, dt)
 
     def _within_schedule(self, velocity: Velocity) -> Velocity:
-        """Limit the velocity to what keeps balance and the speed of every foot in range."""
+        """Scale the velocity down until no foot exceeds the schedule's speed."""
         fastest = max(
             math.hypot(velocity.x - velocity.yaw * place[1], velocity.y + velocity.yaw * place[0])
             for place in self._neutral

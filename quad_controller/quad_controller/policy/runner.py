@@ -195,7 +195,7 @@ class PolicyRunner:
         return tuple(targets)
 
     def _limits(self, robot: Quadruped, share: float) -> tuple[Floats, Floats]:
-        """Return the target ranges in the policy's order, extended to the default pose."""
+        """Return the target ranges in the policy's order, including the default pose."""
         lower, upper = self._defaults.copy(), self._defaults.copy()
         for policy, place in self._places:
             limits = robot.limits[place]

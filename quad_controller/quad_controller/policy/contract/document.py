@@ -72,7 +72,7 @@ class ContractDocument:
             yield path, _text(value), self.origins.get(path, '')
 
     def to_yaml(self) -> str:
-        """Return the document as YAML, with comments for origins in other files."""
+        """Return the document as YAML; comments name the origins of its values."""
         head = ''.join(
             f'# {path}: {origin}\n' for path, origin in sorted(self.origins.items()) if origin
         )
