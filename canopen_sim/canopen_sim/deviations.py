@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Deviations of simulated devices from good ones: the one table of faults and odd devices.
+"""Faults and quirks of simulated devices, all in one table.
 
-A row has a name, what the device does in words, its settings, and what it acts on: frames of a
-service, an axis of a drive, or the device. Services, the line and drives read this table.
+A row has a name, a description, its settings, and its target: frames of a service, an axis of a
+drive, or the device. Services, the line and drives read this table.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Rewrite = Callable[[bytes], bytes]
 
 
 class Service(Enum):
-    """What a frame is for."""
+    """CANopen service to which a frame belongs."""
 
     SDO = 'SDO'
     PDO = 'PDO'
@@ -37,7 +37,7 @@ class Service(Enum):
 
 
 class Effect(Enum):
-    """What becomes of a frame that a fault hits."""
+    """Effect of a fault on a frame."""
 
     LOSE = auto()
     DELAY = auto()
@@ -46,7 +46,7 @@ class Effect(Enum):
 
 
 def _with_command(command: int, data: bytes) -> bytes:
-    """Return an expedited answer to a read with another command byte, and with garbage behind."""
+    """Return an expedited upload response with another command byte and trailing garbage."""
     if not data or data[0] & 0xE2 != 0x42:
         return data
     size = FRAME_BYTES - (data[0] >> 2 & 0x03)
@@ -54,7 +54,7 @@ def _with_command(command: int, data: bytes) -> bytes:
 
 
 def _shortened(data: bytes) -> bytes:
-    """Return an answer without its unused bytes."""
+    """Return a response without its unused bytes."""
     match data[0] >> 5 if data else None:
         case 0:
             return data[: FRAME_BYTES - (data[0] >> 1 & 0x07)]
@@ -68,7 +68,7 @@ def _shortened(data: bytes) -> bytes:
 
 
 def _with_other_crc(data: bytes) -> bytes:
-    """Return the frame that ends a block transfer with another CRC; it has 5 reserved bytes."""
+    """Return the end frame of a block transfer with a wrong CRC; it has 5 reserved bytes."""
     ends = bool(data) and data[0] & 0xE3 == 0xC1 and not any(data[3:])
     return data[:1] + bytes(byte ^ 0xFF for byte in data[1:3]) + data[3:] if ends else data
 
@@ -123,7 +123,7 @@ def _odd_drive(text: str, *settings: str) -> FaultKind:
 
 
 class Fault(Enum):
-    """Every fault; :attr:`label` is its name in services."""
+    """All faults; :attr:`label` is the name of a fault in services."""
 
     SDO_DELAY = _sdo_answers('answers SDOs late', 'object', 'delay', effect=Effect.DELAY)
     SDO_SILENCE = _sdo_requests('does not answer SDOs', 'object', *RANDOM)
@@ -237,7 +237,7 @@ def _kept(text: str) -> bool:
 
 
 class Setting(NamedTuple):
-    """How a setting is read, and what it may be."""
+    """Parser and valid range of a setting."""
 
     read: Callable[[str], object]
     wanted: str
@@ -268,7 +268,7 @@ SETTINGS: dict[str, Setting] = {
     'abort': Setting(_abort, 'an SDO abort code, such as 0x08000000 or general'),
     'position_kept': Setting(_kept, 'true or false'),
 }
-"""Settings that are not whole numbers of 32 bits, or may not be all of them."""
+"""Settings that are not 32-bit integers, or have a smaller range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,10 +303,10 @@ class FaultInjection:
     value: int = 0  # what the object holds
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning.
+        """Refuse invalid settings.
 
         Raises:
-            ValueError: A number is out of range, or a setting is not one of this fault.
+            ValueError: A number is out of range, or this fault has no such setting.
         """
         for name, setting in SETTINGS.items():
             if not setting.allows(value := getattr(self, name)):
@@ -318,16 +318,16 @@ class FaultInjection:
 
     @property
     def key(self) -> tuple[Fault, int, int, tuple[int, int] | None]:
-        """What it replaces when it is injected: the same fault of the same part."""
+        """Identifies fault and target; a new injection with the same key replaces this one."""
         return self.fault, self.pdo, self.axis, self.object
 
     @property
     def lasting(self) -> bool:
-        """It goes on until it is ended; otherwise it is over in a moment."""
+        """Whether the fault lasts until it is ended; otherwise it is momentary."""
         return self.fault.value.lasting or bool(self.duration)
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Describe the fault and its settings."""
         kind = self.fault.value
         parts = (
             f'{self.fault.label}: {kind.text}',
@@ -343,7 +343,7 @@ class FaultInjection:
 
 
 def fault_list() -> str:
-    """Return every fault with what it does and its settings, one per line."""
+    """Return all faults with descriptions and settings, one per line."""
     return '\n'.join(
         f'  {name}: {fault.value.text} ({", ".join((*fault.value.settings, "duration"))})'
         for name, fault in FAULTS.items()
@@ -351,11 +351,11 @@ def fault_list() -> str:
 
 
 def parse_fault(name: str, lines: Iterable[str], duration: float) -> FaultInjection:
-    """Read a fault as people write it; each line is ``name=value`` of one of its settings.
+    """Parse a fault from its name and lines ``name=value``, one for each setting.
 
     Raises:
-        ValueError: A name is unknown, or a value has no meaning; an unknown fault is answered
-            with all.
+        ValueError: A name is unknown, or a value is invalid; for an unknown fault the message
+            lists all faults.
     """
     fault = FAULTS.get(name)
     if fault is None:
@@ -381,7 +381,7 @@ def parse_fault(name: str, lines: Iterable[str], duration: float) -> FaultInject
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """Return that a name is unknown, with the nearest of those known, or all of them."""
+    """Return a message that a name is unknown, with the most similar name, or all names."""
     names = list(known)
     close = difflib.get_close_matches(name, names, n=1)
     remedy = f'did you mean {close[0]!r}?' if close else f'choose one of {", ".join(names)}'

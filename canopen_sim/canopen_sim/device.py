@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated CANopen device, driven by calls: it owns no bus, no thread and no clock."""
+"""A simulated CANopen device, driven by calls; it owns no bus, thread or clock."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ from .pdo import Handler, RpdoEngine, TpdoEngine
 from .sdo_server import SdoServers
 
 RateUnits = Mapping[int, tuple[float, float]]
-"""By axis: what 1 of its velocities is in [inc/s], and of its accelerations in [inc/s^2]."""
+"""By axis: its unit of velocity in [inc/s], and its unit of acceleration in [inc/s^2]."""
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
 ALL_OBJECTS = (0x0000, 0xFFFF)
 
 
 class Device:
-    """A CANopen device made from its object dictionary; with 0x6040 in it, it is a drive.
+    """A CANopen device built from an object dictionary; if that has 0x6040, it is a drive.
 
-    Call :meth:`advance` once to switch it on, then whenever :attr:`deadline` is due, and
-    :meth:`receive` for each frame. All times are on the steady clock in [s].
+    Call :meth:`advance` once to switch it on, then at each :attr:`deadline`, and :meth:`receive`
+    for each frame. All times are on the steady clock in [s].
     """
 
     def __init__(
@@ -68,12 +68,12 @@ class Device:
         """Build a device that is switched off.
 
         Args:
-            dictionary: Its objects, as load_eds reads them.
-            send: Takes the frames that it sends.
-            boot_time: How long its start takes in [s].
-            handlers_changed: Called when :attr:`handlers` is another mapping.
-            memory: Its non-volatile memory; by default one that lasts as long as the object.
-            rate_units: Units of the axes that do not have those of the EDS.
+            dictionary: Object dictionary, as returned by load_eds.
+            send: Called with each frame that the device sends.
+            boot_time: Duration of Initialisation in [s].
+            handlers_changed: Called after :attr:`handlers` was replaced.
+            memory: Non-volatile memory; by default it lasts as long as the device object.
+            rate_units: Units of the axes that differ from those in the EDS.
 
         Raises:
             ValueError: The node id is out of range.
@@ -127,7 +127,7 @@ class Device:
         self._parts = self._powered_parts
 
     def _own_rate_units(self, axis: int) -> tuple[float, float]:
-        """Return the units of velocities and accelerations that the EDS says."""
+        """Return the units of velocity and acceleration given in the EDS."""
 
         def default(index: int, subindex: int) -> int | None:
             entry = self.store.dictionary.get(index + axis * AXIS_OFFSET, subindex)
@@ -156,7 +156,7 @@ class Device:
 
     @property
     def drive(self) -> Drive | None:
-        """The first axis, None when the device is not a drive."""
+        """The first axis; None if the device is not a drive."""
         return self.drives[0] if self.drives else None
 
     @property
@@ -166,21 +166,21 @@ class Device:
 
     @property
     def powered(self) -> bool:
-        """It has power."""
+        """Whether the device has power."""
         return self._parts is self._powered_parts
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which :meth:`advance` has something to do."""
+        """Steady time in [s] at which :meth:`advance` is due."""
         return min(part.deadline for part in self._parts)
 
     def next_deadline(self) -> float | None:
-        """Return :attr:`deadline`, or None when the device waits for frames only."""
+        """Return :attr:`deadline`, or None if the device only waits for frames."""
         deadline = self.deadline
         return None if deadline == float('inf') else deadline
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Process a frame from the bus; those for others are ignored."""
+        """Process a frame from the bus; ignore frames for other devices."""
         if frame.is_extended or frame.is_error:
             return
         if frame.is_remote:
@@ -202,12 +202,12 @@ class Device:
         self._tpdos.poll(now)
 
     def postpone_watches(self, stalled: float) -> None:
-        """Postpone time-outs by the time in [s] for which this computer stood still."""
+        """Postpone time-outs by a time in [s] during which this computer stood still."""
         self._error_control.postpone(stalled)
         self._rpdos.postpone(stalled)
 
     def switch_off(self, now: float) -> None:
-        """Cut the power: the device falls silent, and the motor runs out."""
+        """Cut the power: the device becomes silent, and the motor coasts."""
         if not self.powered:
             return
         self._line.clear()
@@ -224,9 +224,9 @@ class Device:
         self._subscribe()
 
     def switch_on(self, now: float, *, position_kept: bool = True) -> None:
-        """Restore the power: the device starts, its objects with their defaults.
+        """Restore the power: the device boots with the default values of its objects.
 
-        Without ``position_kept`` the encoder does not know where the motor is, and counts from 0.
+        Without ``position_kept`` the encoder loses the motor position, and counts from 0.
         """
         if self.powered:
             return
@@ -238,15 +238,15 @@ class Device:
         self.advance(now)
 
     def repeat_emcy(self, period: float, now: float) -> None:
-        """Send the last EMCY again and again; 0 ends that (from the injector)."""
+        """Repeat the last EMCY periodically; 0 stops that (called by the injector)."""
         self._errors.repeat(period, now)
 
     def faults_changed(self) -> None:
-        """Pass frames through the faults of the line (from the injector)."""
+        """Apply the faults of the line to frames (called by the injector)."""
         self._subscribe()
 
     def _reset(self, command: NmtCommand, now: float) -> None:
-        """Return to the defaults of the whole device or of its communication."""
+        """Restore the defaults of the whole device or of its communication objects."""
         whole = command is NmtCommand.RESET_NODE
         self._error_control.stop()
         self._rpdos.stop(now)
@@ -296,7 +296,7 @@ class Device:
         self._application.connection_lost()
 
     def _subscribe(self) -> None:
-        """Offer the services of the present NMT state."""
+        """Register the handlers of the present NMT state."""
         handlers = self._present_handlers() if self.powered else {}
         if self._line.faults:
             filtered = self._line.filtered
@@ -368,7 +368,7 @@ CODE_SEQUENCE = 1  # bit 0 of 0x6000: the position falls when the shaft turns cl
 
 
 class Application:
-    """What a device does beside communicating: nothing."""
+    """Base of device applications; it does nothing."""
 
     def refresh(self, now: float) -> None:
         """Update the objects to a steady time in [s]."""
@@ -378,9 +378,9 @@ class Application:
 
 
 class IoModule(Application):
-    """Inputs that are wired to the outputs of the same number, so that a program sees them act.
+    """I/O module whose inputs are wired to the outputs of the same number, to show their effect.
 
-    An input that has no output keeps what a test writes into its variable.
+    An input without such an output keeps the value that a test writes into its variable.
     """
 
     def __init__(self, store: ObjectStore) -> None:
@@ -400,7 +400,7 @@ class IoModule(Application):
                     _wire(output, store.find(*inputs[number].address))
 
     def connection_lost(self) -> None:
-        """Set the outputs to their error values, as far as the error mode says so."""
+        """Set the outputs to their error values where the error mode selects it."""
         for output, mode, value in self._outputs:
             if not (isinstance(output, Scalar) and isinstance(mode, Scalar)):
                 continue
@@ -454,7 +454,7 @@ class Encoder(Application):
 
 
 def make_application(store: ObjectStore) -> Application:
-    """Return what the profile in 0x1000 asks for."""
+    """Return the application for the device profile in 0x1000."""
     profile = profile_number(store.dictionary)
     if profile == DeviceProfile.GENERIC_IO:
         return IoModule(store)

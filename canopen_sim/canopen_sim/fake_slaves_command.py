@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen-fake-slaves``: the devices of a bus.yml simulated, by a command without ROS."""
+"""``canopen-fake-slaves``: a command that simulates the devices of a bus.yml, without ROS."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The faults of one simulated device: the line that loses and changes frames, and the injector."""
+"""Faults of one simulated device: a line that loses and changes frames, and the injector."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ OTHER_DEVICE_DELAY = 0.0005  # [s] by which another device of the same node id a
 
 
 class Traffic(NamedTuple):
-    """What a frame is to its device."""
+    """Role of a frame for its device."""
 
     service: Service  # its kind
     outgoing: bool  # the device sends it
@@ -37,10 +37,10 @@ class Traffic(NamedTuple):
 
 
 class ActiveFault:
-    """A fault that goes on."""
+    """An active fault."""
 
     def __init__(self, injection: FaultInjection, node_id: int, end: float) -> None:
-        """Begin; each device and fault has random numbers of its own."""
+        """Start the fault; each device and fault has its own random numbers."""
         self.injection = injection  # its description
         self.end = end  # steady time in [s] at which it ends
         self.exhausted = False  # it hit as many frames as it was to hit
@@ -49,7 +49,7 @@ class ActiveFault:
         self._random = random.Random(seed)  # noqa: S311  # repeatable noise, no secret
 
     def hits(self, frame: Frame, traffic: Traffic) -> bool:
-        """Return whether it strikes a frame, and count it."""
+        """Return whether the fault hits a frame, and count the frame."""
         if self.exhausted or not self._concerns(frame, traffic):
             return False
         probability = self.injection.probability
@@ -72,9 +72,9 @@ class ActiveFault:
 
 
 def sdo_object(data: bytes, specifiers: tuple[int, ...]) -> tuple[int, int] | None:
-    """Return the object that an SDO names, None when it continues a transfer.
+    """Return the object that an SDO frame names; None if it continues a transfer.
 
-    The command specifiers are those that name one, in its direction.
+    ``specifiers`` are the command specifiers of its direction that name an object.
     """
     if len(data) < FRAME_BYTES or data[0] >> 5 not in specifiers:
         return None
@@ -91,7 +91,7 @@ class FaultLine:
         abort: Callable[[sdo.Abort], None],
         identify: Callable[[Frame, bool], Traffic],
     ) -> None:
-        """Begin as a good line; ``identify`` gets whether a frame is outgoing."""
+        """Create a line without faults; ``identify`` also gets whether a frame is outgoing."""
         self.faults: list[ActiveFault] = []  # the faults of the line that go on
         # steady time in [s] of what the device does at the moment; its owner keeps it
         self.now = 0.0
@@ -103,7 +103,7 @@ class FaultLine:
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which a late frame arrives."""
+        """Steady time in [s] at which the next delayed frame arrives."""
         return self._late[0][0] if self._late else NEVER
 
     def send(self, frame: Frame) -> None:
@@ -123,17 +123,17 @@ class FaultLine:
         return lambda frame, now: self.receive(frame, now, deliver)
 
     def clear(self) -> None:
-        """Lose the frames that are late."""
+        """Drop all delayed frames."""
         self._late.clear()
 
     def advance(self, now: float) -> None:
-        """Deliver late frames."""
+        """Deliver delayed frames that are due."""
         self.now = now
         while self._late and self._late[0][0] <= now:
             heapq.heappop(self._late)[2](now)
 
     def _pass(self, frame: Frame, deliver: Deliver, *, outgoing: bool) -> None:
-        """Deliver what the faults leave of a frame, now or late."""
+        """Apply the faults to a frame; deliver the result now or delayed."""
         traffic = self._identify(frame, outgoing)
         delay = 0.0
         for fault in self.faults:
@@ -180,7 +180,7 @@ OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
 
 
 class Powered(Protocol):
-    """What the injector does with its device."""
+    """Interface of a device for the injector."""
 
     node_id: int
     store: ObjectStore
@@ -196,10 +196,10 @@ class Powered(Protocol):
         """Restore the power."""
 
     def repeat_emcy(self, period: float, now: float) -> None:
-        """Send the last EMCY again and again; 0 ends that."""
+        """Repeat the last EMCY periodically; 0 stops that."""
 
     def faults_changed(self) -> None:
-        """The line has other faults from now on."""
+        """Notify the device that the faults of its line have changed."""
 
 
 class FaultInjector:
@@ -219,16 +219,16 @@ class FaultInjector:
 
     @property
     def active(self) -> tuple[FaultInjection, ...]:
-        """The faults that go on."""
+        """The active faults."""
         self._forget_exhausted()
         return tuple(active.injection for active in self._active.values())
 
     def inject(self, injection: FaultInjection, now: float) -> None:
-        """Begin a fault; the same fault of the same PDO or object ends.
+        """Inject a fault; it replaces the same fault of the same PDO or object.
 
         Raises:
-            ValueError: It is a fault of a drive, and the device is none or lacks the axis; or of
-                an object, and the device has no such number.
+            ValueError: The fault needs a drive axis or an object that the device does not
+                have.
         """
         self._line.now = now
         fault, kind = injection.fault, injection.fault.value
@@ -253,7 +253,7 @@ class FaultInjector:
             self._update_line()
 
     def end(self, now: float, fault: Fault | None = None) -> None:
-        """End a fault, or all (None); a device without power is switched on."""
+        """End a fault, or all faults (None); switch a device without power on."""
         self._line.now = now
         for key, active in list(self._active.items()):
             if fault in (None, active.injection.fault):
@@ -262,7 +262,7 @@ class FaultInjector:
         self._update_line()
 
     def advance(self, now: float) -> None:
-        """Deliver late frames, and end the faults whose time is over."""
+        """Deliver delayed frames, and end faults that have expired."""
         self._line.advance(now)
         over = [key for key, active in self._active.items() if active.end <= now]
         for key in over:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Several simulated devices on one bus: who gets a frame, their thread, and a whole bus.yml."""
+"""Simulated devices on one bus: distribution of frames, their thread, and a whole bus.yml."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at aga
 class DeviceHost:
     """Devices that share a connection to a bus; they receive each other too.
 
-    A bus object never receives what it sent itself, so the frames of one device are handed to
-    the others here. Each frame goes straight to those who want its identifier.
+    A bus object never receives its own frames, so the host passes frames of one device to the
+    others. Each frame goes directly to the devices that handle its identifier.
     """
 
     def __init__(
@@ -37,10 +37,10 @@ class DeviceHost:
         send: Callable[[Frame], None],
         on_defect: Callable[[Device, Exception], None] | None = None,
     ) -> None:
-        """Begin without devices.
+        """Create a host without devices.
 
-        ``on_defect`` gets an exception in a device, while the others go on; without it the
-        exception leaves the host.
+        ``on_defect`` is called with an exception of a device, and the others continue; without it
+        the host raises the exception.
         """
         self.devices: list[Device] = []  # in the order in which they were added
         self._send = send
@@ -90,11 +90,11 @@ class DeviceHost:
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which :meth:`advance` has something to do."""
+        """Steady time in [s] at which :meth:`advance` is due."""
         return min((self._due(device) for device in self.devices), default=NEVER)
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Hand a frame from the bus to all devices that want it."""
+        """Pass a frame from the bus to all devices that handle it."""
         self._dispatch(frame, None, now)
         self._dispatch_echoes(now)
 
@@ -110,7 +110,7 @@ class DeviceHost:
         self._dispatch_echoes(now)
 
     def postpone_watches(self, stalled: float) -> None:
-        """Postpone time-outs by the time in [s] for which this computer stood still."""
+        """Postpone time-outs by a time in [s] during which this computer stood still."""
         for device in self.devices:
             device.postpone_watches(stalled)
 
@@ -118,7 +118,7 @@ class DeviceHost:
         """Return the device with a node id.
 
         Raises:
-            KeyError: There is none.
+            KeyError: There is no such device.
         """
         for device in self.devices:
             if device.node_id == node_id:
@@ -178,10 +178,10 @@ logger = logging.getLogger(__name__)
 
 
 class DeviceRunner(BusThread):
-    """Waits for frames and deadlines, and gives them to the devices of a host.
+    """Waits for frames and deadlines, and passes them to the devices of a host.
 
-    A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
-    ones do. A defect in one device is logged, and the others go on.
+    If the bus disappears (interface down), the devices keep running like real ones until it is
+    back. An exception in one device is logged, and the others continue.
     """
 
     def __init__(self, bus: Bus) -> None:
@@ -193,7 +193,7 @@ class DeviceRunner(BusThread):
 
     @property
     def bus_name(self) -> str:
-        """Where the devices are, as `can_interface_name` writes it."""
+        """Name of the bus, in the syntax of `can_interface_name`."""
         return self._bus.name
 
     def _serve(self) -> None:
@@ -221,7 +221,7 @@ class DeviceRunner(BusThread):
 
 
 def _pass_over(frames: list[Frame], now: float) -> list[Frame]:
-    """Return what devices see of frames that waited because they got no processor."""
+    """Return the frames that devices receive after this process was not scheduled."""
     kept = newest_process_data(frames)
     syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
     if len(kept) == len(frames):
@@ -237,10 +237,10 @@ def _pass_over(frames: list[Frame], now: float) -> list[Frame]:
 
 
 def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
-    """Return what the mailboxes of a CAN controller hold of frames that were not read in time.
+    """Return the frames that a CAN controller's mailboxes would keep if they are not read in time.
 
-    A device that stood still sees the newest set-point, and does not follow all those of the past.
-    Of SDO and NMT, whose clients wait for their answers, all is kept.
+    A device that stood still receives only the newest set-point, not all previous ones. SDO and
+    NMT frames are all kept, because clients wait for responses.
     """
     newest = {frame.can_id: frame for frame in frames}
     return [
@@ -261,18 +261,18 @@ def _log_defect(device: Device, error: Exception) -> None:
 
 ANSWER_TIME = 0.15  # [s] a device answers an SDO within some milliseconds, unless it is too busy
 EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or boot-up'}
-"""Frames that only the device with a node id sends, by their first identifier."""
+"""Frames that only the device with the node id sends, by their first identifier."""
 
 
 class NodeIdCheck:
-    """Listens for devices with given node ids, beside other work of a start."""
+    """Checks whether node ids are taken on the bus, in parallel with other start-up work."""
 
     def __init__(
         self, bus: Bus, node_ids: Iterable[int], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Request an answer of each; what was received before counts, too.
+        """Send a request to each node id; frames received earlier count as well.
 
-        The bus has no other reader.
+        The bus must not have another reader.
         """
         self.found: dict[int, str] = {}  # what was received from them, in words, by identifier
         self._bus = bus
@@ -291,10 +291,10 @@ class NodeIdCheck:
                 bus.send(Frame(CobId.SDO_REQUEST + node_id, request))
 
     def finish(self) -> None:
-        """Wait for the rest of the time in which a device would have answered.
+        """Wait until every device should have responded.
 
         Raises:
-            CanopenError: There are such devices; the message names their frames and the remedy.
+            CanopenError: A node id is taken; the message names the frames and the remedy.
         """
         readable = self._receive(0.0)  # what came beside other work, however long that took
         while readable and not self.found and (left := self._until - self._clock()) > 0.0:
@@ -331,9 +331,9 @@ def add_devices(
 ) -> None:
     """Add the devices of a bus to a host, switched off.
 
-    Positions are where axes stand at the start, by name, in the units of bus.yml [rad or m], as
-    their absolute encoders report it; the others report 0 increments. ``memory`` makes what a
-    device keeps without power, by node id.
+    ``positions`` are initial positions of axes, by name, in the units of bus.yml [rad or m], as
+    reported by their absolute encoders; other axes report 0 increments. ``memory`` creates the
+    non-volatile memory of a node id.
 
     Raises:
         CanopenError: The bus has no such axis, or it cannot report such a position.
@@ -368,17 +368,17 @@ def simulated_devices(
 ) -> Iterator[DeviceRunner]:
     """Simulate the devices of a bus.yml on a bus, in a thread that ends with the context.
 
-    The bus is named as for :func:`canopen_core.can.open_bus`. Positions are where drives stand at
-    the start, by name, in the units of bus.yml [rad or m].
+    The bus is named as for :func:`canopen_core.can.open_bus`. ``positions`` are initial positions
+    of drives, by name, in the units of bus.yml [rad or m].
 
     Yields:
-        What runs them; ``runner.call`` gets at ``runner.host.devices``.
+        The runner; use ``runner.call`` to access ``runner.host.devices``.
 
     Raises:
         ConfigError: The bus.yml or an EDS is wrong.
         BusError: The bus cannot be opened.
-        CanopenError: The bus has no such drive, or it cannot report such a position; or devices
-            with these node ids are on it already.
+        CanopenError: A drive is unknown or cannot report its initial position, or devices with
+            these node ids are already on the bus.
     """
     config = load_bus(bus_config)
     with open_bus(bus) as can:

@@ -92,7 +92,7 @@ class EmcyProducer:
         return min(self._flush_at, self._repeat_at)
 
     def reset(self) -> None:
-        """Forget every error, as after switching on."""
+        """Clear all errors, as after power-on."""
         self._active.clear()
         self._pending.clear()
         self._register.value = 0
@@ -100,16 +100,16 @@ class EmcyProducer:
         self._flush_at = NEVER
 
     def allow(self, allowed: bool, now: float) -> None:
-        """Allow messages, or hold them back (NMT Stopped)."""
+        """Allow EMCY messages, or suppress them (NMT Stopped)."""
         self._allowed = allowed
         self._flush(now)
 
     def report(
         self, code: int, now: float, source: object = None, vendor: bytes = bytes(5)
     ) -> None:
-        """Report that an error occurred; one that is active already is not repeated.
+        """Report an error, unless it is already active.
 
-        The source has it, such as an axis; it is gone when all have lost it.
+        ``source`` is its origin, such as an axis; the error is gone when all sources cleared it.
         """
         sources = self._active.setdefault(code, set())
         known = bool(sources)
@@ -122,14 +122,14 @@ class EmcyProducer:
         self._queue(self._last, now)
 
     def set_error(self, code: int, present: bool, now: float, source: object = None) -> None:
-        """Report an error that is present at a time in [s], or clear one that is not."""
+        """Report an error if it is present at a time in [s], else clear it."""
         if present:
             self.report(code, now, source)
         else:
             self.clear(code, now, source)
 
     def clear(self, code: int, now: float, source: object = None) -> None:
-        """Report that an error is gone; the error register of the message has what remains."""
+        """Report that an error is gone; the error register in the message has the other ones."""
         sources = self._active.get(code, set())
         sources.discard(source)
         if sources or code not in self._active:
@@ -139,7 +139,7 @@ class EmcyProducer:
         self._queue(Emergency(0, self._register.value), now)
 
     def advance(self, now: float) -> None:
-        """Send what the inhibit time held back."""
+        """Send messages delayed by the inhibit time."""
         if now >= self._repeat_at:
             self._repeat_at = now + self._repeat_period
             self._queue(self._last, now)
@@ -147,7 +147,7 @@ class EmcyProducer:
             self._flush(now)
 
     def repeat(self, period: float, now: float) -> None:
-        """Send the last EMCY of an error again and again from a time in [s] on; 0 ends that."""
+        """Repeat the last EMCY of an error periodically from a time in [s] on; 0 stops that."""
         self._repeat_period = period
         self._repeat_at = now if period else NEVER
 
@@ -216,8 +216,8 @@ class SyncConsumer:
         """Bind 0x1005, 0x1006, 0x1007 and 0x1019.
 
         ``handle`` is called with the counter (0 without one) and the time of each SYNC,
-        ``length_error`` with whether its length was wrong, and ``changed`` when SYNC has another
-        identifier from now on.
+        ``length_error`` with whether its length was wrong, and ``changed`` when the identifier of
+        SYNC has changed.
         """
         # time between two SYNCs in [s], from 0x1006 or else measured; 0 when unknown
         self.period = 0.0
@@ -240,7 +240,7 @@ class SyncConsumer:
         return self._cob_id.value & CAN_ID_MASK
 
     def alive(self, now: float) -> bool:
-        """Return whether SYNC comes regularly at this time."""
+        """Return whether SYNC arrives regularly at this time."""
         return self.period > 0.0 and now - self.last_time < LOST_PERIODS * self.period
 
     def window_closed(self, now: float) -> bool:
@@ -249,13 +249,13 @@ class SyncConsumer:
         return window > 0.0 and now - self.last_time > window
 
     def reset(self) -> None:
-        """Forget what was measured."""
+        """Discard the measured period."""
         self.period = self._cycle.value * MICROSECOND
         self.last_time = float('-inf')
         self._paused = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Process a SYNC; one of the wrong length is reported as well."""
+        """Process a SYNC, and report a wrong length."""
         self._length_error(len(frame.data) != bool(self._overflow.value), now)
         if not self._cycle.value:
             self._measure(now)
@@ -283,7 +283,7 @@ class TimeConsumer:
     """Keeps the network's time of the last TIME message."""
 
     def __init__(self, store: ObjectStore, changed: Callable[[], None]) -> None:
-        """Bind 0x1012; ``changed`` is called when TIME is wanted, or under another identifier."""
+        """Bind 0x1012; ``changed`` is called when it enables TIME or changes the identifier."""
         self._cob_id = store.integer(Index.TIME_COB_ID)
         self._cob_id.check = self._check
         self._cob_id.listener = lambda _now: changed()
@@ -291,7 +291,7 @@ class TimeConsumer:
 
     @property
     def can_id(self) -> int | None:
-        """Identifier of the TIME message, None when the device takes none."""
+        """Identifier of the TIME message; None if the device does not consume TIME."""
         value = self._cob_id.value
         return value & CAN_ID_MASK if value & TIME_CONSUMER else None
 
@@ -303,11 +303,11 @@ class TimeConsumer:
         return time + timedelta(seconds=now - moment)
 
     def reset(self) -> None:
-        """Forget the time, as after switching on."""
+        """Discard the time, as after power-on."""
         self._received = None
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Process a TIME message; one of another length is ignored."""
+        """Process a TIME message; ignore one with the wrong length."""
         with contextlib.suppress(CodecError):
             self._received = decode_time_of_day(frame.data), now
 

@@ -37,10 +37,10 @@ class NmtSlave:
         changed: Callable[[NmtState, float], None],
         boot_time: float,
     ) -> None:
-        """Begin switched off; the first :meth:`advance` starts Initialisation, of a time in [s].
+        """Start switched off; the first :meth:`advance` starts Initialisation (duration in [s]).
 
-        ``reset`` returns to the defaults of the whole device or of its communication; ``changed``
-        is called with the previous state when another was entered, also after boot-up.
+        ``reset`` restores the defaults of the whole device or of its communication; ``changed``
+        is called with the previous state after each change of state, also after boot-up.
         """
         self.state = NmtState.BOOT_UP  # BOOT_UP stands for Initialisation
         self.deadline = 0.0  # when Initialisation ends, as steady time in [s]
@@ -62,14 +62,14 @@ class NmtSlave:
             self.enter(COMMANDED_STATES[command], now)
 
     def enter(self, state: NmtState, now: float) -> None:
-        """Go to a state; nothing happens when it is the present one."""
+        """Enter a state, unless it is the present one."""
         if state is self.state:
             return
         previous, self.state = self.state, state
         self._changed(previous, now)
 
     def advance(self, now: float) -> None:
-        """Begin Initialisation after power-on; end it when its time is over."""
+        """Start Initialisation after power-on; end it when its time has passed."""
         if not self._powered:
             self._powered = True
             self._initialise(NmtCommand.RESET_NODE, now)
@@ -96,19 +96,19 @@ GOLDEN_RATIO = 0.618034  # its multiples, less their whole part, are spread most
 TOGGLE = 0x80
 HEARTBEAT_ERROR = 0x8130  # EMCY: life guard error or heartbeat error
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
-"""Where a communication error leads from Operational, by 0x1029:01; 1 leads nowhere."""
+"""State after a communication error in Operational, by 0x1029:01; 1 changes nothing."""
 
 
 class ErrorControl:
     """Error control of one device.
 
-    It sends the NMT state at the period of 0x1017. The devices of a network are often configured
-    in the same instant; so that their heartbeats do not crowd, the first one after a start is
+    The producer sends the NMT state at the period of 0x1017. Devices of a network are often
+    configured at the same instant; to spread their heartbeats, the first one after a start is
     early by a part of the period that depends on the node id.
 
-    It watches the devices that 0x1016 names, each from its first heartbeat on. And it answers
-    the remote frames of a master that guards it; life guarding begins with the first request. A
-    device that sends heartbeats is not guarded, and one without 0x100C cannot be.
+    The consumer monitors the devices in 0x1016, each from its first heartbeat on. Node guarding
+    answers remote frames of the master; life guarding starts with the first request. A device
+    that sends heartbeats is not guarded, and a device without 0x100C cannot be.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class ErrorControl:
         """Bind 0x100C, 0x100D, 0x1016, 0x1017 and 0x1029.
 
         ``lost`` is called with the time of a loss, on which the axes stop as 0x6007 selects, and
-        ``subscribe`` when other identifiers are listened to.
+        ``subscribe`` when the identifiers to receive have changed.
         """
         self.node_id = nmt.node_id  # id of the device
         self._nmt = nmt
@@ -156,28 +156,28 @@ class ErrorControl:
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] of the next heartbeat, or at which one counts as lost."""
+        """Steady time in [s] to send the next heartbeat, or to report a missing one."""
         return min(self._next_heartbeat, self._first_loss, self._life_end)
 
     @property
     def can_ids(self) -> list[int]:
-        """Identifiers of the heartbeats that it wants to receive."""
+        """Identifiers of the monitored heartbeats."""
         return [CobId.HEARTBEAT + node_id for node_id in self._periods]
 
     def reset(self) -> None:
-        """Begin anew, as after a reset of the communication: the toggle bit is 0."""
+        """Restart, as after a reset of the communication: the toggle bit is 0."""
         self._toggle = False
         self._life_end = NEVER
         self._watch()
 
     def start(self, now: float) -> None:
-        """Begin a new series of heartbeats, or none when the period is 0."""
+        """Start sending heartbeats, unless the period is 0."""
         period = self._period.value * MILLISECOND
         phase = self.node_id * GOLDEN_RATIO % 1.0
         self._next_heartbeat = now + period * (1.0 - phase) if period else NEVER
 
     def stop(self) -> None:
-        """Send no heartbeat until :meth:`start`."""
+        """Stop sending heartbeats until :meth:`start`."""
         self._next_heartbeat = NEVER
 
     def receive(self, frame: Frame, now: float) -> None:
@@ -202,7 +202,7 @@ class ErrorControl:
         self._errors.clear(HEARTBEAT_ERROR, now, self)
 
     def advance(self, now: float) -> None:
-        """Send a heartbeat when it is due; report those that stayed away."""
+        """Send a heartbeat if it is due; report missing ones."""
         if now >= self._next_heartbeat:
             self._send(Frame(CobId.HEARTBEAT + self.node_id, bytes((self._nmt.state,))))
             period = self._period.value * MILLISECOND
@@ -229,7 +229,7 @@ class ErrorControl:
 
     @property
     def _life_time(self) -> float:
-        """How long requests may stay away in [s]; NEVER when nothing watches for them."""
+        """Life guarding time-out in [s]; NEVER if life guarding is off."""
         return self._guard_time.value * self._factor.value * MILLISECOND or NEVER
 
     def _change_life_time(self, now: float) -> None:
@@ -237,7 +237,7 @@ class ErrorControl:
             self._life_end = now + self._life_time
 
     def _watch(self) -> None:
-        """Watch the nodes of 0x1016, from the next heartbeats on."""
+        """Monitor the nodes in 0x1016, each from its next heartbeat on."""
         entries = (_consumer(variable.value) for variable in self._consumers)
         self._periods = {node_id: period for node_id, period in entries if period}
         self._watched.clear()

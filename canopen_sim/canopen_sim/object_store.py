@@ -3,9 +3,9 @@
 """The object dictionary at run time: present values, and the rules of reading and writing them.
 
 Inside the device an object is bound once, as a :class:`Variable`, and then read and written
-through its ``value``; only SDOs look it up by index. What an SDO may do is checked here: what is
-refused raises SdoAbortError, with the code of CiA 301, table 22. Parameters are stored as 7.5.2.13
-has it.
+through its ``value``; only SDOs look it up by index. This module checks SDO access: a refusal
+raises SdoAbortError with the code of CiA 301, table 22. Parameters are stored as in
+7.5.2.13.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ NEVER = float('inf')  # [s] the deadline of a part of the device that waits for 
 
 
 class Timed(Protocol):
-    """A part of the device that has something to do at a time that it knows."""
+    """Interface of a part of the device with a deadline."""
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which it wants to be advanced; :data:`NEVER` for none."""
+        """Steady time in [s] at which :meth:`advance` is due; :data:`NEVER` for none."""
 
     def advance(self, now: float) -> None:
         """Process what is due at steady time ``now`` in [s]."""
 
 
 def refusal(code: AbortCode, place: object) -> SdoAbortError:
-    """Return the exception that ends an SDO transfer; the message names the place."""
+    """Return the exception that aborts an SDO transfer; the message names the object."""
     return SdoAbortError(f'{place}: {abort_text(code)}', code)
 
 
@@ -78,15 +78,15 @@ class Variable:
 
     @property
     def size(self) -> int | None:
-        """Length in an SDO in [byte], None for strings and domains."""
+        """Length in an SDO in [byte]; None for strings and domains."""
         return byte_length(self.entry.data_type)
 
     def restore(self) -> None:
-        """Restore the default, without a call of the listener."""
+        """Restore the default without calling the listener."""
         self.value = default_value(self.entry)
 
     def decoded(self, data: bytes) -> Value:
-        """Return the value of bytes, within the limits of the object."""
+        """Decode bytes to a value; refuse a value beyond the limits of the object."""
         self.check_length(len(data))
         try:
             value = decode(self.entry.data_type, data)
@@ -96,14 +96,14 @@ class Variable:
         return value
 
     def accept(self, data: bytes) -> Value:
-        """Return the value of bytes that an SDO wants to write."""
+        """Decode and check bytes that an SDO writes; return the value."""
         value = self.decoded(data)
         if self.check is not None:
             self.check(value)
         return value
 
     def check_length(self, size: int) -> None:
-        """Refuse a transfer of so many [byte] when the type is shorter or longer."""
+        """Refuse a transfer whose length in [byte] does not match the type."""
         expected = self.size
         if expected is None and size > STRING_BYTES_MAX:
             raise refusal(AbortCode.OUT_OF_MEMORY, self.entry)
@@ -123,14 +123,14 @@ class Variable:
 
 
 class Scalar(Variable):
-    """A number, the only kind of object that travels in a PDO."""
+    """A number, the only kind of object that PDOs carry."""
 
     __slots__ = ()
     value: Number
 
 
 class Integer(Scalar):
-    """A whole number; low and high are the ends of its type."""
+    """An integer; low and high are the bounds of its type."""
 
     __slots__ = ('high', 'low')
     value: int
@@ -140,7 +140,7 @@ class Integer(Scalar):
         self.low, self.high = integer_range(entry.data_type) or (0, 0)
 
     def put(self, value: float) -> None:
-        """Store a number, rounded and held within its type."""
+        """Store a number, rounded and clamped to its type."""
         self.value = min(max(round(value), self.low), self.high)
 
 
@@ -158,7 +158,7 @@ def default_value(entry: ObjectEntry) -> Value:
 
 
 def make_variable(entry: ObjectEntry) -> Variable:
-    """Return a variable of the kind that the entry's type needs."""
+    """Return a variable of the class for the entry's type."""
     if integer_range(entry.data_type) is not None:
         return Integer(entry)
     return Scalar(entry) if entry.data_type in REAL_FORMATS else Variable(entry)
@@ -193,9 +193,9 @@ class ObjectStore:
         raise refusal(code, object_address(index, subindex))
 
     def integer(self, index: int, subindex: int = 0, *, default: int = 0) -> Integer:
-        """Bind an integer object, for the device's own use.
+        """Bind an integer object for use inside the device.
 
-        A device whose dictionary lacks it gets one with the default that is invisible outside.
+        If the dictionary lacks the object, return one with the default that SDOs cannot see.
         """
         variable = self._variables.get((index, subindex))
         if isinstance(variable, Integer):
@@ -213,7 +213,7 @@ class ObjectStore:
                     variable.value = self.saved[address]
 
     def read(self, index: int, subindex: int = 0) -> bytes:
-        """Return what an SDO upload yields."""
+        """Return the bytes that an SDO upload reads."""
         variable = self.find(index, subindex)
         if not variable.entry.access.readable:
             raise refusal(AbortCode.WRITE_ONLY, variable.entry)
@@ -251,16 +251,16 @@ FRAME_BITS = COB_ID_EXTENDED | 0x1FFF_FFFF  # bits 0 to 29: the identifier and i
 
 
 def check_can_id(entry: ObjectEntry, value: Value) -> None:
-    """Refuse an identifier for an object that is extended or set aside for other services."""
+    """Refuse an identifier that is extended or reserved for other services."""
     can_id = int(value) & FRAME_BITS if isinstance(value, int) else 0
     if can_id > CAN_ID_MASK or any(first <= can_id <= last for first, last in RESTRICTED_CAN_IDS):
         raise refusal(AbortCode.VALUE_RANGE, entry)
 
 
 def check_cob_id(variable: Integer, value: Value) -> None:
-    """Refuse a COB-ID that the service behind an object cannot take.
+    """Refuse a COB-ID that the service of an object cannot use.
 
-    An identifier may only be changed while the service does not exist (bit 31 is set).
+    An identifier may only be changed while the service is disabled (bit 31 is set).
     """
     word = int(value) if isinstance(value, int) else 0
     if word & COB_ID_INVALID:
@@ -279,7 +279,7 @@ GROUPS: dict[int, tuple[int, int]] = {
     2: (0x1000, 0x1FFF),  # communication
     3: (0x6000, 0x9FFF),  # application
 }
-"""First and last index of what a sub-index stores; those above 3 are the manufacturer's."""
+"""First and last index stored by a sub-index; those above 3 are manufacturer-specific."""
 MANUFACTURER = (0x2000, 0x5FFF)
 
 NEVER_STORED = frozenset(
@@ -302,8 +302,8 @@ Address = tuple[int, int]
 class ParameterMemory:
     """Non-volatile memory in a file; without one it lasts as long as the process.
 
-    A file that cannot be read counts as empty memory, as a device with a broken EEPROM starts
-    with its defaults; that is logged.
+    An unreadable file is logged and counts as empty memory, as a device with a broken EEPROM
+    starts with its defaults.
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -322,7 +322,7 @@ class ParameterMemory:
             logger.error('%s holds no stored parameters, the defaults are used: %s', path, error)
 
     def commit(self) -> None:
-        """Write the file: all of it, or nothing."""
+        """Write the file atomically."""
         if self._path is None:
             return
         content = {
@@ -372,7 +372,7 @@ class ParameterStorage:
                     variable.listener = partial(self._accept, variable, act)
 
     def load(self) -> None:
-        """Put the saved values in force at the next restoring of the store."""
+        """Apply the saved values when the store is restored next."""
         saved: dict[tuple[int, int], Value] = {}
         for address, data in self._memory.values.items():
             if address not in self._store:
@@ -403,7 +403,7 @@ class ParameterStorage:
         self._verify(before)
 
     def _verify(self, before: dict[tuple[int, int], bytes]) -> None:
-        """Erase the signature 0x1020 if something else was saved than what it stands for."""
+        """Erase the signature 0x1020 if the saved values differ from those it stands for."""
         signature = [(int(Index.VERIFY_CONFIGURATION), sub) for sub in (1, 2)]
         after = self._memory.values
         changed = {key for key in after if before.get(key) != after[key]}

@@ -19,7 +19,7 @@ ErrorReport = Callable[[int, bool, float, object], None]
 
 
 class Rpdo(PdoChannel):
-    """One receive PDO: writes what it carries into the object dictionary."""
+    """One receive PDO: writes its values into the object dictionary."""
 
     transmission_types = frozenset((*range(SYNCHRONOUS_MAX + 1), *TRANSMISSION_EVENT))
 
@@ -48,13 +48,13 @@ class Rpdo(PdoChannel):
         self._listeners = tuple(dict.fromkeys(listeners))  # each once
 
     def reset(self) -> None:
-        """Forget what was received and waits for SYNC."""
+        """Discard received data that waits for SYNC."""
         self.deadline = NEVER
         self._held = None
         self._short = self._late = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Receive a PDO: into the dictionary at once, or at the next SYNC."""
+        """Receive a PDO; write it to the dictionary at once, or at the next SYNC."""
         short = len(frame.data) < self.codec.size
         if short is not self._short:
             self._short = short
@@ -74,7 +74,7 @@ class Rpdo(PdoChannel):
             self.notify_listeners(now)
 
     def store_held(self) -> bool:
-        """Put what came since the last SYNC into the dictionary; return whether there was any."""
+        """Store data received since the last SYNC in the dictionary; return if there was any."""
         if self._held is None:
             return False
         data, self._held = self._held, None
@@ -82,12 +82,12 @@ class Rpdo(PdoChannel):
         return True
 
     def notify_listeners(self, now: float) -> None:
-        """Call the listeners of the objects of this PDO: they were written."""
+        """Call the listeners of the objects that this PDO has written."""
         for listener in self._listeners:
             listener(now)
 
     def advance(self, now: float) -> None:
-        """Report that the PDO stayed away."""
+        """Report that the PDO is overdue."""
         if now >= self.deadline:
             self.deadline = NEVER
             self._late = True
@@ -127,7 +127,7 @@ DUMMIES: dict[int, ObjectEntry] = {
         DataType.UNSIGNED32,
     )
 }
-"""Data types that may stand in the mapping of an RPDO for bytes to be skipped (CiA 301, 7.4.7)."""
+"""Data types that an RPDO may map as dummies, for bytes to skip (CiA 301, 7.4.7)."""
 
 
 def _chained(receivers: Sequence[Handler], finished: Callable[[float], None]) -> Handler:
@@ -151,9 +151,9 @@ class RpdoEngine(PdoEngine[Rpdo]):
     ) -> None:
         """Bind every RPDO of a dictionary.
 
-        ``changed`` is called when a client changed one of them, ``report`` with a code, whether
-        that error is there, the time, and a PDO. ``too_late`` returns whether the synchronous
-        window is over at a time.
+        ``changed`` is called when a client has changed an RPDO, ``report`` with an error code,
+        whether that error is present, the time, and the PDO. ``too_late`` returns whether the
+        synchronous window has closed at a time.
         """
         super().__init__(changed)
         self._report = report
@@ -164,16 +164,16 @@ class RpdoEngine(PdoEngine[Rpdo]):
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which the first of them is overdue."""
+        """Steady time in [s] at which the next RPDO becomes overdue."""
         return min((rpdo.deadline for rpdo in self.active), default=NEVER)
 
     def start(self) -> None:
-        """Receive from now on."""
+        """Start receiving."""
         self._running = True
         self._select()
 
     def stop(self, now: float) -> None:
-        """Receive no more; errors of reception are over."""
+        """Stop receiving, and clear reception errors."""
         for rpdo in self.active:
             rpdo.reset()
         for rpdo in self.channels:
@@ -183,9 +183,9 @@ class RpdoEngine(PdoEngine[Rpdo]):
         self._select()
 
     def sync(self, now: float) -> None:
-        """Put the synchronous ones into the dictionary.
+        """Write the data of synchronous RPDOs to the dictionary.
 
-        Every value is stored before any listener is called: what one SYNC makes valid belongs
+        All values are stored before any listener is called, because values of one SYNC belong
         together, such as a controlword in one PDO and its target in another.
         """
         for rpdo in [rpdo for rpdo in self.active if rpdo.store_held()]:
@@ -197,14 +197,14 @@ class RpdoEngine(PdoEngine[Rpdo]):
             rpdo.deadline += stalled
 
     def advance(self, now: float) -> None:
-        """Report those that are overdue."""
+        """Report overdue RPDOs."""
         for rpdo in self.active:
             rpdo.advance(now)
 
     def handlers(self, finished: Callable[[float], None]) -> dict[int, Handler]:
-        """Return what takes the frames of each identifier; several PDOs may share one.
+        """Map each identifier to its handler; several PDOs may share an identifier.
 
-        ``finished`` is called with the time when the objects have their new values.
+        ``finished`` is called with the time after the objects have their new values.
         """
         receivers: dict[int, list[Handler]] = {}
         for rpdo in self.active:
@@ -250,7 +250,7 @@ class Tpdo(PdoChannel):
         super().__init__(store, number, (Index.TPDO_COMMUNICATION, Index.TPDO_MAPPING), changed)
 
     def start(self, now: float) -> None:
-        """Begin as on entering Operational: an event-driven PDO is sent once."""
+        """Start as on entering Operational: an event-driven PDO is sent once."""
         self._sent = self._sampled = None
         self._free_time = now
         self._countdown = 0 if self.sync_start else self.transmission
@@ -261,7 +261,7 @@ class Tpdo(PdoChannel):
         return self.codec.pack([variable.value for variable in self.variables])
 
     def sync(self, counter: int, now: float) -> None:
-        """Send if this SYNC is its turn; the counter is 0 without one."""
+        """Send if the PDO is due at this SYNC; counter is 0 if SYNC has none."""
         if self.transmission == ACYCLIC:
             payload = self.pack()
             if payload != self._sent:
@@ -283,18 +283,18 @@ class Tpdo(PdoChannel):
         return True
 
     def poll(self, now: float) -> None:
-        """Send as soon as allowed if a value changed since the last transmission."""
+        """Send as soon as permitted if a value has changed since the last transmission."""
         if self.deadline > self._free_time and self.pack() != self._sent:
             self.deadline = self._free_time
             self.advance(now)
 
     def advance(self, now: float) -> None:
-        """Send if the event timer or the inhibit time is over."""
+        """Send if the event timer has elapsed, or the inhibit time of a pending change."""
         if now >= self.deadline:
             self._transmit(self.pack(), now)
 
     def request(self, now: float) -> None:
-        """Answer a remote frame, where COB-ID and type allow it."""
+        """Respond to a remote frame, if COB-ID and transmission type allow it."""
         if not self.rtr_allowed:
             return
         if self.transmission == RTR_SYNC:
@@ -325,7 +325,7 @@ class TpdoEngine(PdoEngine[Tpdo]):
         changed: Callable[[], None],
         send: Callable[[Frame], None],
     ) -> None:
-        """Bind every TPDO of a dictionary; ``changed`` is called when a client changed one."""
+        """Bind every TPDO of a dictionary; ``changed`` is called when a client has changed one."""
         super().__init__(changed)
         self.deadline = NEVER  # steady time in [s] at which one of them is to be sent
         self._synchronous: list[Tpdo] = []
@@ -336,7 +336,7 @@ class TpdoEngine(PdoEngine[Tpdo]):
         ]
 
     def start(self, now: float) -> None:
-        """Send from now on."""
+        """Start sending."""
         self._running = True
         self._select()
         for tpdo in self.active:
@@ -344,7 +344,7 @@ class TpdoEngine(PdoEngine[Tpdo]):
         self.advance(now)
 
     def stop(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._running = False
         self._select()
         self.deadline = NEVER
@@ -365,19 +365,19 @@ class TpdoEngine(PdoEngine[Tpdo]):
         self._changed()
 
     def sync(self, counter: int, now: float) -> None:
-        """Send those whose turn this SYNC is."""
+        """Send the TPDOs that are due at this SYNC."""
         for tpdo in self._synchronous:
             tpdo.sync(counter, now)
 
     def poll(self, now: float) -> None:
-        """Send the event-driven ones whose values changed."""
+        """Send the event-driven TPDOs whose values have changed."""
         if self._event_driven:
             for tpdo in self._event_driven:
                 tpdo.poll(now)
             self._update_deadline()
 
     def advance(self, now: float) -> None:
-        """Send those that are due."""
+        """Send the TPDOs that are due."""
         for tpdo in self._event_driven:
             tpdo.advance(now)
         self._update_deadline()

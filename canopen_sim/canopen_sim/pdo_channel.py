@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What RPDOs and TPDOs have in common: their parameter objects, and the rules of writing them.
+"""Base of RPDOs and TPDOs: their parameter objects, and the rules for writing them.
 
-A PDO is changed while it does not exist (CiA 301, 7.5.2.36): set bit 31 of its COB-ID, set the
+A PDO is changed while it is disabled (CiA 301, 7.5.2.36): set bit 31 of its COB-ID, set the
 number of mapped objects to 0, write the mapping, then the number, then the COB-ID.
 """
 
@@ -49,10 +49,10 @@ class PdoChannel(ABC):
         records: tuple[int, int],
         changed: Callable[[PdoChannel, float], None],
     ) -> None:
-        """Bind the parameter objects of one PDO; ``number`` is their offset from the first ones.
+        """Bind the parameter objects of one PDO; ``number`` is their offset from the first PDO.
 
-        The records are those of communication and mapping. ``changed`` is called with the PDO and
-        the time when a client changed it.
+        The records are the communication and the mapping record. ``changed`` is called with the
+        PDO and the time when a client has changed it.
         """
         self.number = number + 1  # from 1
         communication, mapping = (index + number for index in records)
@@ -87,21 +87,21 @@ class PdoChannel(ABC):
 
     @property
     def is_synchronous(self) -> bool:
-        """It goes with SYNC."""
+        """Whether SYNC triggers the PDO."""
         return self.transmission <= SYNCHRONOUS_MAX
 
     @property
     def is_event_driven(self) -> bool:
-        """It goes when something happens."""
+        """Whether events trigger the PDO."""
         return self.transmission in TRANSMISSION_EVENT
 
     @property
     def rtr_allowed(self) -> bool:
-        """It may be requested by a remote frame."""
+        """Whether remote frames may request the PDO."""
         return not self._cob_id.value & RTR_FORBIDDEN
 
     def configure(self) -> None:
-        """Read the parameter objects; a PDO whose mapping cannot be used does not exist."""
+        """Read the parameter objects; a PDO with an unusable mapping is disabled."""
         self.can_id = self._cob_id.value & CAN_ID_MASK  # its identifier
         self.transmission = self._type.value  # transmission type (CiA 301, tables 69 and 71)
         self.inhibit_time = self._inhibit.value * INHIBIT_UNIT
@@ -144,7 +144,7 @@ class PdoChannel(ABC):
     @staticmethod
     @abstractmethod
     def _is_mappable(entry: ObjectEntry) -> bool:
-        """Return whether an object may travel in this direction."""
+        """Return whether an object may be mapped in this direction."""
 
     def _find(self, index: int, subindex: int) -> Variable:
         return self._store.find(index, subindex)
@@ -175,7 +175,7 @@ class PdoChannel(ABC):
 
 
 def total_bits(variables: Sequence[Scalar]) -> int:
-    """Return how many [bit] variables take together in a PDO."""
+    """Return the total length of variables in a PDO in [bit]."""
     return sum(bit_length(variable.entry.data_type) or 0 for variable in variables)
 
 
@@ -186,7 +186,7 @@ class PdoEngine(Generic[Channel]):
     """All PDOs of a device in one direction."""
 
     def __init__(self, changed: Callable[[], None]) -> None:
-        """Begin stopped; ``changed`` is called when a client changed a PDO."""
+        """Start stopped; ``changed`` is called when a client has changed a PDO."""
         self.channels: list[Channel] = []  # those of the dictionary
         self.active: list[Channel] = []  # those that exist, while the device is Operational
         self._running = False
@@ -198,7 +198,7 @@ class PdoEngine(Generic[Channel]):
             channel.configure()
 
     def number_of(self, can_id: int) -> int:
-        """Return the number of the active PDO with an identifier, 0 when there is none."""
+        """Return the number of the active PDO with an identifier; 0 if there is none."""
         return next((pdo.number for pdo in self.active if pdo.can_id == can_id), 0)
 
     def _select(self) -> None:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """SDO servers of a device: expedited, segmented and block transfers (CiA 301, 7.2.4.3).
 
-One transfer at a time, as the standard has it for one SDO channel: a client that initiates
-another one gives the first up. What makes no sense at its point raises SdoAbortError.
+One transfer at a time, as in the standard for one SDO channel: initiating another transfer ends
+the first one. A frame that is invalid in the present state raises SdoAbortError.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .object_store import check_cob_id, NEVER, ObjectStore, refusal, STRING_BYTE
 
 
 class BlockDownload:
-    """A block transfer by which a client writes."""
+    """A block transfer in which a client writes."""
 
     def __init__(self, request: bytes) -> None:
         command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
@@ -33,7 +33,7 @@ class BlockDownload:
         self._finished = False
 
     def initiated(self) -> bytes:
-        """Return the answer to the initiation."""
+        """Return the response to the initiation."""
         return struct.pack(
             '<BHBB3x',
             sdo.DOWNLOAD_INITIATED | sdo.CRC_BIT,
@@ -43,7 +43,7 @@ class BlockDownload:
         )
 
     def segment(self, frame: bytes) -> bytes | None:
-        """Receive a segment; after the last one of a block return how far they came in order."""
+        """Receive a segment; after the last of a block, acknowledge those received in order."""
         number, last = frame[0] & ~sdo.LAST, bool(frame[0] & sdo.LAST)
         if number == 0:
             raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
@@ -62,7 +62,7 @@ class BlockDownload:
         return struct.pack('<BBB5x', sdo.DOWNLOAD_ACKNOWLEDGED, taken, sdo.BLOCK_SEGMENTS_MAX)
 
     def end(self, request: bytes) -> bytes:
-        """Process the client's end; check length and checksum, and return the answer."""
+        """Process the client's end frame; check length and checksum, and return the response."""
         if not self._finished:
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO block')
         command, crc = struct.unpack_from('<BH', request)
@@ -77,10 +77,10 @@ class BlockDownload:
 
 
 class BlockUpload:
-    """A block transfer by which a client reads."""
+    """A block transfer in which a client reads."""
 
     def __init__(self, request: bytes, data: bytes) -> None:
-        """Begin with the client's initiation, for the data of the object."""
+        """Start from the client's initiation, with the data of the object."""
         command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
         self.finished = False  # the client has confirmed the end
         self._data = data
@@ -92,12 +92,12 @@ class BlockUpload:
         self._set_block(segments)
 
     def initiated(self) -> bytes:
-        """Return the answer to the initiation."""
+        """Return the response to the initiation."""
         command = sdo.UPLOAD_INITIATED | sdo.SIZE_BIT | sdo.CRC_BIT
         return struct.pack('<BHBI', command, self.index, self.subindex, len(self._data))
 
     def proceed(self, request: bytes) -> list[bytes]:
-        """Process a frame of the client within the transfer; return the answer."""
+        """Process a frame of the client within the transfer; return the response."""
         subcommand = request[0] & 0x03
         if subcommand == sdo.START_UPLOAD and not self._sent and not self._position:
             return self._block()
@@ -173,12 +173,12 @@ class SdoServer:
         self._transfer: Transfer | BlockDownload | BlockUpload | None = None
 
     def reset(self) -> None:
-        """Forget a transfer under way."""
+        """Drop the transfer under way."""
         self._transfer = None
         self.deadline = NEVER
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Answer a request."""
+        """Respond to a request."""
         if len(frame.data) < FRAME_BYTES:
             return
         answers = self._answer(frame.data, now)
@@ -187,7 +187,7 @@ class SdoServer:
             self._send(Frame(self.response_id, answer))
 
     def advance(self, now: float) -> None:
-        """Abort the transfer of a client that fell silent."""
+        """Abort the transfer of a client that timed out."""
         if now < self.deadline:
             return
         transfer = self._transfer
@@ -197,7 +197,7 @@ class SdoServer:
             self._send(Frame(self.response_id, abort.encode()))
 
     def _answer(self, data: bytes, now: float) -> list[bytes]:
-        """Return the answer; an abort names the object of the request, else of the transfer."""
+        """Return the response; an abort names the object of the request, else of the transfer."""
         transfer, specifier = self._transfer, data[0] >> 5
         is_block = specifier in (sdo.CLIENT_UPLOAD, sdo.CLIENT_DOWNLOAD)
         names_none = specifier in (0, 3) or (is_block and data[0] & 0x03)
@@ -231,7 +231,7 @@ class SdoServer:
         return answers
 
     def _block_download(self, data: bytes, now: float) -> bytes:
-        """Begin a block download, or end the one whose segments have all come."""
+        """Start a block download, or end one whose segments have all arrived."""
         transfer = self._transfer
         if not data[0] & 0x01:
             transfer = BlockDownload(data)
@@ -324,7 +324,7 @@ class SdoServer:
         return sdo.DownloadSegmentResponse(request.toggle)
 
     def _expect(self, toggle: bool, *, is_download: bool) -> Transfer:
-        """Return the transfer that a segment belongs to, and turn its toggle bit."""
+        """Return the transfer that a segment belongs to, and flip its toggle bit."""
         transfer = self._transfer
         if not isinstance(transfer, Transfer) or transfer.is_download is not is_download:
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
@@ -335,7 +335,7 @@ class SdoServer:
 
 
 class SdoServers:
-    """The SDO servers of a device, each with a transfer of its own."""
+    """The SDO servers of a device, each with its own transfer."""
 
     def __init__(
         self,
@@ -344,9 +344,9 @@ class SdoServers:
         send: Callable[[Frame], None],
         changed: Callable[[], None],
     ) -> None:
-        """Bind 0x1201 and those after it, as far as the dictionary has them.
+        """Bind 0x1201 and the following objects, as far as the dictionary has them.
 
-        ``changed`` is called when requests have other identifiers from now on.
+        ``changed`` is called when the identifiers of requests have changed.
         """
         self._store = store
         self._send = send
@@ -380,11 +380,11 @@ class SdoServers:
 
     @property
     def deadline(self) -> float:
-        """Steady time in [s] at which the transfer of a silent client is aborted."""
+        """Steady time in [s] at which the next transfer times out."""
         return min((server.deadline for server in self._channels.values()), default=NEVER)
 
     def configure(self) -> None:
-        """Serve the channels that exist; those that stay keep their transfer."""
+        """Serve the enabled channels; unchanged channels keep their transfer."""
         channels = {self.default.can_id: self.default}
         for request, response in self._objects:
             if not (request.value | response.value) & COB_ID_INVALID:
@@ -396,18 +396,18 @@ class SdoServers:
         self._channels = channels
 
     def reset(self) -> None:
-        """Forget the transfers under way."""
+        """Drop the transfers under way."""
         for server in self._channels.values():
             server.reset()
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Answer a request."""
+        """Respond to a request."""
         server = self._channels.get(frame.can_id)
         if server is not None:
             server.receive(frame, now)
 
     def advance(self, now: float) -> None:
-        """Abort the transfers of clients that fell silent."""
+        """Abort the transfers of clients that timed out."""
         for server in self._channels.values():
             server.advance(now)
 

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""An axis: the motion that is demanded of a motor, the motor that follows it, and its switches.
+r"""An axis: the demanded motion, the motor that follows it, and its switches.
 
-The demand goes in phases of constant acceleration. A phase follows from the state at its
-beginning and from the goal (a velocity, or a position to stand at), so a goal can change at any
-time without a jump. A step of the axis ends where a phase does, and the solution within a phase
-is exact: neither demand nor motor depends on how often they are looked at.
+The demand consists of phases of constant acceleration. Each phase follows from the state at its
+start and from the goal (a velocity, or a position to stop at), so the goal can change at any
+time without a jump. A step of the axis ends at the end of a phase, and the solution within a
+phase is exact: results do not depend on how often the axis is advanced.
 
 The motor position :math:`y` follows the demand :math:`r` through a first-order lag,
 :math:`\tau \dot y = r - y`. On a phase with velocity :math:`v` and acceleration :math:`a`
@@ -13,12 +13,12 @@ The motor position :math:`y` follows the demand :math:`r` through a first-order 
 .. math::
     y(s) = q(s) + (y_0 - q(0))\, e^{-s/\tau}, \qquad q(s) = r(s) - \tau r'(s) + \tau^2 a.
 
-A demand that is faster than the motor passes a rate limiter before, in steps of 1 ms. Without
-torque the motor coasts against its brake: its velocity decays with another time constant.
+A demand faster than the motor first passes a rate limiter, in steps of 1 ms. Without torque the
+motor coasts against its brake: its velocity decays with another time constant.
 
 Of a torque :math:`T` the motor makes :math:`\dot v = g\,(T - L - T_c \operatorname{sign} v - b v)`
 with the load :math:`L`, dry friction :math:`T_c` and viscous friction :math:`b`. A positive load
-pulls towards negative positions and needs a positive torque to be held, as gravity does.
+pulls towards negative positions, as gravity does, and a positive torque holds it.
 
 Positions are in [inc], velocities in [inc/s], accelerations in [inc/s^2], torques in [0.1 % of
 the rated torque], times on the steady clock in [s].
@@ -73,10 +73,10 @@ INTERLOCK_BIT = 0x8  # of 0x60FD: safe torque off
 
 @dataclass(frozen=True, slots=True)
 class Switches:
-    """Where the switches of an axis are, from its mechanical zero in [inc].
+    """Positions of the switches of an axis in [inc], relative to its mechanical zero.
 
-    The mechanical zero is where the motor stood when it was first switched on; homing does not
-    move it. The drive shows limit switches in 0x60FD, and stops at them only during homing.
+    The mechanical zero is the motor position at the first power-on; homing does not move it.
+    The drive shows limit switches in 0x60FD, and stops at them only during homing.
     """
 
     # at and below it the negative limit switch is active; -inf for none
@@ -98,7 +98,7 @@ class Switches:
         return self.home[0] <= position <= self.home[1]
 
     def limit_ahead(self, direction: int, position: float) -> bool:
-        """Return whether the limit switch is active that lies in a direction."""
+        """Return whether the limit switch in a direction is active."""
         ahead = Switch.POSITIVE_LIMIT if direction > 0 else Switch.NEGATIVE_LIMIT
         return self.active(ahead, position)
 
@@ -107,14 +107,14 @@ class Switches:
         return sum(bit for switch, bit in SWITCH_BITS.items() if self.active(switch, position))
 
     def edge(self, switch: Switch, side: int) -> float:
-        """Return where a switch changes; of the home switch the edge on a side."""
+        """Return the position of a switch's edge; for the home switch, the edge on one side."""
         if switch is Switch.HOME:
             return self.home[side > 0]
         negative = switch is Switch.NEGATIVE_LIMIT
         return self.negative_limit if negative else self.positive_limit
 
     def next_index(self, position: float, direction: int) -> float:
-        """Return the index pulse that comes next in a direction, infinite when there is none."""
+        """Return the position of the next index pulse in a direction; infinite for none."""
         if self.index_period <= 0.0:
             return direction * math.inf
         turns = (position - self.index) / self.index_period
@@ -174,7 +174,7 @@ class Axis:
 
     @property
     def blocked(self) -> bool:
-        """The position loop pushes the motor against a mechanical stop."""
+        """Whether the position loop pushes the motor against a mechanical stop."""
         low, high = self._stops
         if not self.powered or low < self.position < high:
             return False
@@ -183,12 +183,12 @@ class Axis:
 
     @property
     def arrived(self) -> bool:
-        """The demand has come to the end of its motion, a constant velocity included."""
+        """Whether the demand has ended its motion or reached a constant velocity."""
         return self.phase_end == NEVER
 
     @property
     def settled(self) -> bool:
-        """Demand and motor stand still, and will not move by themselves."""
+        """Whether demand and motor are at rest, and stay so without a command."""
         if not self.powered:
             return self._free_velocity == 0.0
         at_rest = self.phase_end == NEVER and self.demand_velocity == 0.0
@@ -196,13 +196,13 @@ class Axis:
 
     @property
     def torque(self) -> float:
-        """Torque that the demanded motion takes."""
+        """Torque required by the demanded motion."""
         inertia = 0.0 if self.arrived else self._acceleration / TORQUE_GAIN
         return inertia + self.steady_torque if self.powered else 0.0
 
     @property
     def steady_torque(self) -> float:
-        """Torque that keeps the velocity, and holds the load at rest."""
+        """Torque that keeps the velocity constant, and holds the load at rest."""
         if not self.powered:
             return 0.0
         velocity = self.velocity
@@ -210,33 +210,33 @@ class Axis:
         return dry + VISCOUS_FRICTION * velocity + self.load
 
     def set_stops(self, low: float, high: float) -> None:
-        """Put mechanical stops at positions, infinite for none."""
+        """Place mechanical stops at positions; infinite for none."""
         self._stops = (low, high)
 
     def power_on(self, deceleration: float) -> None:
-        """Close the position loop where the motor is; one that still runs out is ramped down."""
+        """Close the position loop at the motor position; ramp down a motor that still coasts."""
         self._setpoint = self.position + self._free_velocity * self._model.lag
         self.powered = True
         self.stop(deceleration)
 
     def power_off(self) -> None:
-        """Open the position loop; the motor runs out against its brake."""
+        """Open the position loop; the motor coasts against its brake."""
         self._free_velocity = self.velocity
         self.powered = self.speed_limited = False
         self._rest()
 
     def move(self, target: float, limits: Limits) -> None:
-        """Go to a position and stand still there, as fast as the limits allow."""
+        """Move to a position and stop there, as fast as the limits allow."""
         self._target, self._limits = target, limits
         self._begin(self._move_phase)
 
     def ramp(
         self, velocity: float, limits: Limits, bounds: tuple[float, float] = NO_BOUNDS
     ) -> bool:
-        """Ramp to a velocity and keep it, or stop where a position bound lies ahead.
+        """Ramp to a velocity and keep it, or stop at a position bound ahead.
 
         Returns:
-            The motion ends at a bound.
+            Whether the motion ends at a bound.
         """
         speed = min(abs(velocity), limits.velocity)
         self._wanted, self._limits = math.copysign(speed, velocity), limits
@@ -251,16 +251,16 @@ class Axis:
         return bounded
 
     def line(self, target: float, duration: float) -> None:
-        """Go to a position at constant velocity in a given time, then stand still."""
+        """Move to a position at constant velocity in a given time, then stop."""
         self._target = target
         self._plan = self._stand
         self.demand_velocity = (target - self.demand) / duration
         self._cruise(duration)
 
     def stop(self, deceleration: float) -> float:
-        """Ramp down to a stop; return where that is.
+        """Ramp down to a stop; return its position.
 
-        It begins where the motor is, if the demand is far ahead of it or a cyclic set-point,
+        The ramp begins at the motor position if the demand is far ahead, or is a cyclic set-point,
         which has no velocity.
         """
         if self.speed_limited or self.arrived:
@@ -270,7 +270,7 @@ class Axis:
         return place
 
     def push(self, torque: float) -> None:
-        """Apply a torque for :data:`TORQUE_STEP`; the velocity is kept then."""
+        """Apply a torque for :data:`TORQUE_STEP`, then keep the velocity."""
         if self.blocked:
             self.demand, self.demand_velocity = self.position, 0.0
         velocity = self.demand_velocity
@@ -288,7 +288,7 @@ class Axis:
         self.ramp(end, Limits(math.inf, rate, rate))
 
     def rests(self, torque: float) -> bool:
-        """Return whether friction holds a standing motor against a torque and the load."""
+        """Return whether friction holds a motor at rest against a torque and the load."""
         return abs(torque - self.load) <= DRY_FRICTION
 
     def shift(self, offset: float) -> None:
@@ -301,12 +301,12 @@ class Axis:
         self._stops = (self._stops[0] + offset, self._stops[1] + offset)
 
     def advance(self, now: float) -> None:
-        """Go on to a time; earlier ones are ignored."""
+        """Advance to a time; ignore earlier times."""
         while self.time < now:
             self.step(now)
 
     def step(self, until: float) -> None:
-        """Go on to a time, or to the end of the present phase if that comes before."""
+        """Advance to a time, or to the end of the present phase if that is earlier."""
         if self.settled:
             if self.powered and not self.blocked:
                 self.position = self._setpoint = self.demand
@@ -389,7 +389,7 @@ class Axis:
         self._constant()
 
     def _rest(self) -> None:
-        """Set the demand to the motor position, so that nothing jumps when power comes."""
+        """Set the demand to the motor position, so that nothing jumps at power-on."""
         self._target = self.position
         self._stand()
 
@@ -406,7 +406,7 @@ class Axis:
             self._free_velocity = 0.0
 
     def _behind(self, duration: float) -> bool:
-        """Return whether the motor cannot follow the demand for a time."""
+        """Return whether the motor cannot follow the demand during a time."""
         last = self.demand_velocity + self._acceleration * duration
         caught = abs(self.demand - self._setpoint) <= ROUNDING
         return not caught or abs(self.demand_velocity) > self.speed or abs(last) > self.speed

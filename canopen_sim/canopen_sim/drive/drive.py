@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulated drive: state machine, modes of operation, faults and a motor (CiA 402-2).
 
-The drive looks at its axis when SYNC comes, and otherwise every few milliseconds while anything
-moves or has to be waited for. How often it looks has no influence on the motion.
+The drive updates its axis at each SYNC, and otherwise every few milliseconds while anything moves
+or is pending. The update rate does not influence the motion.
 """
 
 from __future__ import annotations
@@ -56,11 +56,11 @@ MODES: tuple[type[Mode], ...] = (
 
 
 class ModeSelection:
-    """The modes of a drive.
+    """Selects the mode of a drive.
 
-    A mode is there when it is simulated and 0x6502 of the dictionary names it; where the
-    dictionary does not list it, when it has the objects of the mode. Another one is refused to an
-    SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
+    A mode is available if it is simulated and 0x6502 of the dictionary lists it; without
+    0x6502, if the dictionary has the objects of the mode. Other modes are refused for an SDO;
+    from an RPDO they are ignored, and 0x6061 keeps showing the present mode.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class ModeSelection:
         objects.mode.check = self._check
 
     def reset(self) -> None:
-        """Select what the dictionary has as default, as after switching on."""
+        """Select the default mode of the dictionary, as after power-on."""
         for mode in self._modes.values():
             mode.reset()
         supported = self._objects.supported_modes
@@ -85,7 +85,7 @@ class ModeSelection:
         self.select()
 
     def select(self) -> bool:
-        """Select and display the mode of 0x6060; return whether that is another mode."""
+        """Select and display the mode of 0x6060; return whether the mode has changed."""
         number = self._objects.mode.value
         changed = number != self.current.number and self._supports(number)
         if changed:
@@ -125,8 +125,8 @@ HOMED = int(Statusword.TARGET_REACHED | Statusword.HOMING_ATTAINED)
 class Drive:
     """One axis of a device.
 
-    Times ``now`` are on the steady clock in [s], by default when the drive last looked at its
-    axis.
+    Times ``now`` are on the steady clock in [s]; the default is the time of the last update of
+    the axis.
     """
 
     def __init__(
@@ -179,21 +179,21 @@ class Drive:
 
     @property
     def position(self) -> float:
-        """Where the motor is in [inc]."""
+        """Motor position in [inc]."""
         return self._axis.position
 
     @property
     def origin(self) -> float:
-        """Where the mechanical zero is in [inc]; homing moves the position, not the axis."""
+        """Position of the mechanical zero in [inc]; homing shifts it without moving the axis."""
         return self._axis.origin
 
     @property
     def velocity(self) -> float:
-        """How fast the motor turns in [inc/s]."""
+        """Motor velocity in [inc/s]."""
         return self._axis.velocity
 
     def reset(self, now: float) -> None:
-        """Start anew with the objects as they are; the motor stays where it is."""
+        """Restart with the present objects; the motor stays where it is."""
         self._axis.advance(now)
         self._machine.reset()
         self._word = 0
@@ -204,7 +204,7 @@ class Drive:
         self._publish(now)
 
     def count_from(self, position: float, now: float | None = None) -> None:
-        """Count from a position in [inc] where the motor is, as its encoder after power-on."""
+        """Set the present motor position in [inc], as the encoder reports it after power-on."""
         now = self._axis.time if now is None else now
         self._axis.advance(now)
         self._axis.shift(position - self._axis.position)
@@ -219,7 +219,7 @@ class Drive:
         self._publish(now)
 
     def advance(self, now: float) -> None:
-        """Go on to a time; nothing is to be done while the axis rests."""
+        """Advance to a time; nothing happens while the axis is at rest."""
         if not self._idle:
             self._move(now)
             self._publish(now)
@@ -231,7 +231,7 @@ class Drive:
 
     @contextmanager
     def _at(self, now: float | None) -> Iterator[float]:
-        """Advance to a time, let something happen then, and publish what can be seen of it."""
+        """Advance to a time, perform an action there, and update the visible objects."""
         now = self._axis.time if now is None else now
         self._move(now)
         yield now
@@ -243,7 +243,7 @@ class Drive:
             self._fail(code, moment, at_once=at_once)
 
     def inject(self, injection: FaultInjection, now: float) -> None:
-        """Begin a fault; the cause of one that lasts stays until :meth:`clear`."""
+        """Inject a fault; the cause of a lasting fault stays until :meth:`clear`."""
         fault, kind = injection.fault, injection.fault.value
         if injection.lasting:
             self.causes.add(fault)
@@ -259,7 +259,7 @@ class Drive:
             self.raise_fault(kind.code, now, at_once=kind.at_once)
 
     def clear(self, fault: Fault, now: float) -> None:
-        """Remove the cause of a fault; the drive then still waits for a fault reset."""
+        """Remove the cause of a fault; the drive still needs a fault reset."""
         self.causes.discard(fault)
         if fault is Fault.BLOCKED_MOTOR:
             self.release(now)
@@ -294,7 +294,7 @@ class Drive:
             self._axis.set_stops(-math.inf, math.inf)
 
     def set_load(self, torque: float, now: float | None = None) -> None:
-        """Load the axis, as gravity does, with what it takes to hold it.
+        """Load the axis, as gravity does; the load is the torque that holds it.
 
         A positive load in [0.1 % of the rated torque] pulls towards negative positions.
         """
@@ -304,7 +304,7 @@ class Drive:
                 self._mode.load_changed(moment)
 
     def set_switches(self, switches: Switches) -> None:
-        """Put limit switches, home switch and index pulse in other places."""
+        """Move limit switches, home switch and index pulse."""
         self._axis.switches = switches
         self._publish(self._axis.time)
 
@@ -429,7 +429,7 @@ class Drive:
         self._mode.step(now)
 
     def _publish(self, now: float) -> None:
-        """Write what can be seen from outside, and decide when to look again."""
+        """Write the visible objects, and schedule the next update."""
         objects, axis = self._objects, self._axis
         objects.statusword.value = self._statusword()
         objects.position_actual.put(axis.position)

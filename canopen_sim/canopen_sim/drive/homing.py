@@ -54,7 +54,7 @@ _WITH_INDEX: dict[int, Reference] = {
 REFERENCES: dict[int, Reference] = _WITH_INDEX | {
     number + 16: reference._replace(to_index=False) for number, reference in _WITH_INDEX.items()
 }
-"""Methods 1 to 14, and 17 to 30 that are the same without index pulse (CiA 402-2, 0x6098)."""
+"""Methods 1 to 14, and 17 to 30, the same without index pulse (CiA 402-2, 0x6098)."""
 
 INDEX_METHODS = {33: -1, 34: 1}  # the next index pulse in a direction becomes home
 
@@ -62,7 +62,7 @@ PRESENT_POSITION_METHODS = frozenset({35, 37})  # the present position becomes h
 
 
 class Move(NamedTuple):
-    """Where a search goes, and whether it looks for a switch, with the faster speed."""
+    """A move of a search: its direction, and whether it seeks a switch, at the faster speed."""
 
     direction: int
     fast: bool = False
@@ -73,9 +73,9 @@ Search = Generator[Move, float, float | None]
 
 
 def search(method: int, switches: Switches, position: float) -> Search:
-    """Search for a switch and an index pulse; return None where both limit switches are met.
+    """Search for a switch and an index pulse; return None if both limit switches are reached.
 
-    A search so fast that it runs over the whole home switch comes back.
+    A search that is so fast that it overruns the whole home switch returns to it.
     """
     reference = REFERENCES.get(method)
     if reference is None:
@@ -102,7 +102,7 @@ def search(method: int, switches: Switches, position: float) -> Search:
 
 
 def _to_index(switches: Switches, position: float, start: float, direction: int) -> Search:
-    """Go to the index pulse that comes next after a start."""
+    """Move to the next index pulse after a start."""
     pulse = switches.next_index(start, direction)
     while (position - pulse) * direction < 0.0:
         if switches.limit_ahead(direction, position):
@@ -114,9 +114,9 @@ def _to_index(switches: Switches, position: float, start: float, direction: int)
 class Homing(Mode):
     """Finds home: the home position becomes the home offset 0x607C.
 
-    Method 0 attains home without changing anything. A method that the drive has not, a speed
-    of 0 and a search that meets both limit switches end in "homing error". The start bit taken
-    back interrupts the search.
+    Method 0 attains home without changing anything. An unsupported method, a speed of 0, and a
+    search that reaches both limit switches end in "homing error". Clearing the start bit
+    interrupts the search.
     """
 
     number = OperationMode.HOMING
@@ -131,7 +131,7 @@ class Homing(Mode):
 
     @property
     def waiting(self) -> bool:
-        """A search is under way."""
+        """Whether a search is under way."""
         return self._search is not None or self._home is not None
 
     def reset(self) -> None:
@@ -140,7 +140,7 @@ class Homing(Mode):
         self._cancel()
 
     def start(self, word: int, now: float) -> None:
-        """Stand still and wait for the start; an earlier error is over."""
+        """Stop and wait for the start bit; clear an earlier error."""
         super().start(word, now)
         self._failed = False
         self._cancel()
@@ -172,16 +172,16 @@ class Homing(Mode):
             self._failed = True
 
     def halt(self, now: float) -> None:
-        """Wait with the search."""
+        """Pause the search."""
         self.due = NEVER
 
     def resume(self, now: float) -> None:
-        """Go on with the search."""
+        """Continue the search."""
         if self._search is not None:
             self._go(self._move, now)
 
     def step(self, now: float) -> None:
-        """Read the switches; apply home when the axis stands."""
+        """Read the switches; apply home once the axis is at rest."""
         axis = self.axis
         if self._search is not None and now >= self.due:
             self.due = now + STEP
@@ -200,7 +200,7 @@ class Homing(Mode):
             self._cancel()
 
     def _go(self, move: Move, now: float) -> None:
-        """Go where the search leads."""
+        """Start the next move of the search."""
         objects = self.objects
         self._move, self.due = move, now
         speed = objects.homing_speed_switch if move.fast else objects.homing_speed_zero

@@ -21,7 +21,7 @@ TARGET_REACHED = int(Statusword.TARGET_REACHED)
 
 
 class Mode:
-    """A mode of operation. Without anything overridden, the axis is held where it is.
+    """Base of the modes of operation; unless overridden, it holds the axis in place.
 
     The drive calls it only while operation is enabled, with the axis at the time ``now`` unless
     a method documents otherwise.
@@ -39,19 +39,19 @@ class Mode:
 
     @property
     def waiting(self) -> bool:
-        """Some time has to pass before its status is final."""
+        """Whether the status may still change as time passes."""
         return False
 
     @property
     def torque(self) -> float | None:
-        """Torque that it applies in [0.1 % of the rated torque]; None when a position is held."""
+        """Applied torque in [0.1 % of the rated torque]; None while a position is held."""
         return None
 
     def reset(self) -> None:
-        """Forget everything, as after switching on."""
+        """Clear all state, as after power-on."""
 
     def start(self, word: int, now: float) -> None:
-        """Begin: operation was enabled with a controlword, or the mode was selected then."""
+        """Start: a controlword enabled operation, or the mode was selected while enabled."""
         self.limited = False
         self.due = NEVER
         self.axis.stop(self.objects.slow_down)
@@ -77,7 +77,7 @@ class Mode:
         return False
 
     def step(self, now: float) -> None:
-        """Check the axis after a step of it."""
+        """Check the axis after it made a step."""
 
     def status(self) -> int:
         """Return bits 10, 12 and 13 of the statusword."""
@@ -99,7 +99,7 @@ class Dwell:
         self._since = 0.0
 
     def clear(self) -> None:
-        """Begin again."""
+        """Restart the time."""
         self.reached = self.pending = False
 
     def update(self, condition: bool, duration: float, now: float) -> None:
@@ -198,7 +198,7 @@ class ProfileVelocity(Mode):
 
     @property
     def waiting(self) -> bool:
-        """A velocity is in its window, but not yet for long enough."""
+        """Whether a velocity is in its window, but not yet for long enough."""
         return self._reached.pending or self._standing.pending
 
     def start(self, word: int, now: float) -> None:
@@ -259,7 +259,7 @@ ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 
 
 class SetPoint(NamedTuple):
-    """A target, and the profile parameters as they were when it was handed over."""
+    """A target, and the profile parameters at the time of its set-point."""
 
     target: float  # where to go in [inc], within the software limits
     limits: Limits  # velocity, acceleration and deceleration
@@ -270,15 +270,15 @@ class SetPoint(NamedTuple):
 class ProfilePosition(Mode):
     """Moves to targets by trapezoidal profiles.
 
-    A rising edge of "new set-point" hands the target over, "set-point acknowledge" confirms it.
-    While a move is under way, one further set-point is kept and started when the move has
-    ended, unless "change immediately" lets it take the place of the present one. The
-    acknowledge bit stays set until the master has taken its bit back and there is room for
+    At a rising edge of "new set-point" the drive accepts the target, and confirms it by
+    "set-point acknowledge". During a move, one further set-point is buffered and started when
+    the move has ended, unless "change immediately" makes it replace the present one. The
+    acknowledge bit stays set until the master has cleared its bit and the drive can accept
     another set-point.
 
-    With "change on set-point" the present move passes its target without a stop, where the
-    further set-point lies far enough in the same direction; otherwise it stops there. The step
-    that is due ends at the target.
+    With "change on set-point" the present move passes its target without a stop if the buffered
+    set-point lies far enough in the same direction; otherwise it stops there. The present step
+    ends at the target.
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -293,11 +293,11 @@ class ProfilePosition(Mode):
 
     @property
     def waiting(self) -> bool:
-        """The target is in its window, but not yet for long enough."""
+        """Whether the target is in its window, but not yet for long enough."""
         return self._dwell.pending
 
     def start(self, word: int, now: float) -> None:
-        """Stand still and wait for a set-point."""
+        """Stop and wait for a set-point."""
         self.limited = self._offered = False
         self.due = NEVER
         self._active = self._next = None
@@ -313,7 +313,7 @@ class ProfilePosition(Mode):
 
     @property
     def _arriving(self) -> bool:
-        """The active move has not come to its end."""
+        """Whether the active move has not ended yet."""
         return self.due < NEVER or not self.axis.arrived
 
     def _offer(self, word: int, now: float) -> None:
@@ -351,7 +351,7 @@ class ProfilePosition(Mode):
             self.axis.stop(setpoint.limits.deceleration)
 
     def _pass_target(self, now: float) -> None:
-        """Go through the present target to the next one, if that was requested."""
+        """Pass the present target towards the next one, if requested."""
         active, following = self._active, self._next
         if active is None or following is None or not following.blended or self.halted:
             return
@@ -371,17 +371,17 @@ class ProfilePosition(Mode):
             axis.ramp(math.copysign(top, way), active.limits)
 
     def halt(self, now: float) -> None:
-        """Stand until :meth:`resume`."""
+        """Stay at rest until :meth:`resume`."""
         self.due = NEVER
 
     def resume(self, now: float) -> None:
-        """Go on with the move that was halted."""
+        """Continue the halted move."""
         if self._active is not None:
             self._begin(self._active)
             self._pass_target(now)
 
     def step(self, now: float) -> None:
-        """Begin the next move where the present one ends; see whether the target is reached."""
+        """Start the next move when the present one ends; check whether the target is reached."""
         axis = self.axis
         following = None if self.halted else self._next
         if following is not None and (now >= self.due or not self._arriving):

@@ -19,7 +19,7 @@ ACCELERATIONS = frozenset(
         Index.MAX_DECELERATION,
     }
 )
-"""Objects in the unit of accelerations; the ramps of mode 2 are velocities over times."""
+"""Objects in the unit of acceleration; the ramps of mode 2 are velocities over times."""
 NOMINAL_TORQUE = 1000  # [0.1 % of the rated torque]
 NO_TORQUE_LIMIT = 0xFFFF
 NO_WINDOW = 0xFFFF_FFFF  # 0x6065 and 0x6067: not monitored
@@ -29,7 +29,7 @@ PERIOD_MIN = 0.001  # [s] shortest interpolation period that is believed
 
 
 class Rate:
-    """An object in a unit of its drive, seen in increments per second (or second squared)."""
+    """An object in a drive's own unit, converted to increments per second (or second squared)."""
 
     __slots__ = ('_kind', '_units', 'variable')
 
@@ -40,24 +40,24 @@ class Rate:
 
     @property
     def value(self) -> float:
-        """What it holds in [inc/s]."""
+        """Value in [inc/s]."""
         return self.variable.value * self._units[self._kind]
 
     def put(self, rate: float) -> None:
-        """Store a rate in [inc/s], rounded and held within the type of the object."""
+        """Store a rate in [inc/s], rounded and clamped to the type of the object."""
         self.variable.put(rate / self._units[self._kind])
 
 
 class DriveObjects:
     """All objects of a drive, bound once; units are increments, and [inc/s] of velocities.
 
-    Those that a dictionary lacks get a harmless value and stay invisible.
+    Objects missing in the dictionary get a harmless value and stay invisible.
     """
 
     def __init__(  # noqa: PLR0915  # a table of objects
         self, store: ObjectStore, axis: int = 0, rate_units: tuple[float, float] = (1.0, 1.0)
     ) -> None:
-        """Bind those of an axis, numbered from 0; those of axis n stand 0x800 n further on."""
+        """Bind the objects of an axis, numbered from 0; axis n has an index offset of 0x800 n."""
 
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
             return store.integer(index + self._offset, subindex, default=default)
@@ -198,13 +198,13 @@ class DriveObjects:
         return Limits(min(highest, self.speed), self._vl_ramp(0), self._vl_ramp(1))
 
     def held_torque(self, torque: float) -> float:
-        """Return a torque within 0x6072, 0x60E0 and 0x60E1 in [0.1 % of the rated torque]."""
+        """Clamp a torque to 0x6072, 0x60E0 and 0x60E1 in [0.1 % of the rated torque]."""
         high = min(self.max_torque.value, self.positive_torque.value)
         low = min(self.max_torque.value, self.negative_torque.value)
         return float(min(max(torque, -low), high))
 
     def profile(self, velocity: float) -> Limits:
-        """Return the limits of a profile with a velocity in [inc/s], as they are now."""
+        """Return the present limits of a profile with a velocity in [inc/s]."""
         return Limits(
             min(velocity, self.speed),
             _ramp(self.profile_acceleration, self.max_acceleration),
@@ -220,13 +220,13 @@ class DriveObjects:
     def position_limits(self) -> tuple[float, float]:
         """Return the software position limits in [inc]; infinite when 0x607D sets none.
 
-        They count from the home position, so the home offset is taken off (CiA 402-2, 10.4).
+        They are relative to home, so the home offset is subtracted (CiA 402-2, 10.4).
         """
         low, high, offset = self.limit_low.value, self.limit_high.value, self.home_offset.value
         return (low - offset, high - offset) if low < high else (float('-inf'), float('inf'))
 
     def within_limits(self, position: float, start: float) -> float:
-        """Return the position, or the limit that ends the way to it from a start."""
+        """Return the position, or the limit that a move to it from a start reaches first."""
         low, high = self.position_limits()
         return min(max(position, min(low, start)), max(high, start))
 

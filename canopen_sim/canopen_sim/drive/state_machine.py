@@ -44,7 +44,7 @@ COMMAND_MASKS: tuple[tuple[int, int, DriveCommand], ...] = (
 
 
 def decode_command(controlword: int) -> DriveCommand:
-    """Return the command in a controlword; with bit 7 set there is none but the fault reset."""
+    """Return the command in a controlword; bit 7 permits only the fault reset."""
     for mask, value, command in COMMAND_MASKS:
         if controlword & mask == value:
             return command
@@ -81,15 +81,15 @@ COMMANDED_TRANSITIONS: dict[tuple[State, DriveCommand], Transition] = {
 }
 """Transitions that a controlword causes (CiA 402-2, figure 4 and table 26).
 
-Those of themselves are 0 and 1 (start), 12 (quick stop done), 13 (fault) and 14 (reaction done);
+Automatic transitions are 0 and 1 (start), 12 (quick stop done), 13 (fault) and 14 (reaction done);
 15 is the rising edge of the fault reset bit.
 """
 
 
 class StopOption(Enum):
-    """Values of 0x605A to 0x605E that the drive can do; not every object has each (CiA 402-2).
+    """Supported values of 0x605A to 0x605E; not every object has each of them (CiA 402-2).
 
-    "Current limit" and "voltage limit" brake as hard as the motor can: ramps of twice the quick
+    "Current limit" and "voltage limit" brake as hard as possible: ramps of twice the quick
     stop deceleration. The vendor's value -1 of the fault reaction brakes half as hard as "slow
     down". Of 0x605A those above 4 brake in the same ways, and stay in Quick stop active.
     """
@@ -107,17 +107,17 @@ class StopOption(Enum):
 
     @property
     def stays(self) -> bool:
-        """The drive stays in Quick stop active when it stands still."""
+        """Whether the drive stays in Quick stop active at standstill."""
         return self.value > StopOption.VOLTAGE_LIMIT.value
 
     @property
     def ramp(self) -> StopOption:
-        """How it brakes."""
+        """Braking ramp of this option."""
         return StopOption(self.value - 4 if self.stays else self.value)
 
 
 class AbortConnectionOption(Enum):
-    """Values of 0x6007: what a lost connection to the master causes (CiA 402-2, 0x6007)."""
+    """Values of 0x6007: reaction to a lost connection to the master (CiA 402-2, 0x6007)."""
 
     NO_ACTION = 0
     FAULT = 1
@@ -132,10 +132,10 @@ VOLTAGE_STATES = POWERED_STATES | {State.SWITCHED_ON}
 
 
 class StateMachine:
-    """State of a drive, and the ramps that lie between two states.
+    """State of a drive, and the ramps between two states.
 
-    While a ramp leads out of Operation enabled (option codes 0x605B and 0x605C), the drive stays
-    in that state, and changes when the motor stands.
+    During a ramp out of Operation enabled (option codes 0x605B and 0x605C), the drive stays in
+    that state; it changes when the motor is at standstill.
     """
 
     def __init__(
@@ -147,8 +147,8 @@ class StateMachine:
     ) -> None:
         """Begin in Not ready to switch on.
 
-        ``enabled`` is called with the time when operation is enabled, also again; ``causes`` are
-        what the drive does wrong, at any time.
+        ``enabled`` is called with the time whenever operation is enabled; ``causes`` contains the
+        active faults of the drive, at any time.
         """
         self.state = State.NOT_READY_TO_SWITCH_ON  # present state
         self.voltage = True  # the power stage is supplied
@@ -169,19 +169,19 @@ class StateMachine:
 
     @property
     def operating(self) -> bool:
-        """The mode of operation moves the axis."""
+        """Whether the mode of operation moves the axis."""
         return self.state is State.OPERATION_ENABLED and self._pending is None
 
     @property
     def transient(self) -> bool:
-        """The state is left by itself when the motor stands."""
+        """Whether the drive leaves this state automatically at standstill."""
         if self.state is State.QUICK_STOP_ACTIVE:
             return not self.quick_stop_option.stays
         return self._pending is not None or self.state is State.FAULT_REACTION_ACTIVE
 
     @property
     def quick_stop_option(self) -> StopOption:
-        """What a quick stop does (0x605A)."""
+        """Option code of the quick stop (0x605A)."""
         return chosen(self._objects.quick_stop_option, StopOption.QUICK_STOP)
 
     def start(self) -> None:
@@ -190,12 +190,12 @@ class StateMachine:
             self.state = State.SWITCH_ON_DISABLED
 
     def reset(self) -> None:
-        """Start anew, as after switching on."""
+        """Restart, as after power-on."""
         self._word = 0
         self._power_off(State.NOT_READY_TO_SWITCH_ON)
 
     def command(self, word: int, now: float) -> None:
-        """Execute a controlword, through as many states as it leads."""
+        """Execute a controlword, through as many states as it permits."""
         self._word = word
         command = decode_command(word)
         if command is DriveCommand.ENABLE_OPERATION and self._pending is not None:
@@ -215,7 +215,7 @@ class StateMachine:
             self._power_off(State.FAULT)
 
     def fault(self, *, at_once: bool = False) -> None:
-        """Pass transition 13, and 14 when there is nothing to be stopped.
+        """Pass transition 13, and also 14 if there is nothing to stop.
 
         A fault ``at_once`` leaves no torque to brake with, whatever 0x605E selects.
         """
@@ -252,7 +252,7 @@ class StateMachine:
         self._power_off(State.SWITCH_ON_DISABLED)
 
     def advance(self, now: float) -> None:
-        """Exit a state whose ramp has ended; the axis was advanced before."""
+        """Leave a state whose ramp has ended; advance the axis before."""
         if not self.transient or not self._axis.settled:
             return
         if self._pending is not None:
@@ -325,7 +325,7 @@ class StateMachine:
 
 
 def chosen(variable: Integer, default: Option) -> Option:
-    """Return the option that an object holds, ``default`` for a value without meaning."""
+    """Return the option in an object; ``default`` if its value is invalid."""
     try:
         return type(default)(variable.value)
     except ValueError:

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modes in which the master streams positions, velocities or torques (CiA 402-2, 13 to 15).
 
-While SYNC comes regularly, a set-point that was written is taken at the next SYNC; otherwise at
-once. It holds until the next one is due: for the period of SYNC when there was one for each
-SYNC, else for the interpolation time period 0x60C2.
+While SYNC arrives regularly, a written set-point is applied at the next SYNC, otherwise at once.
+It lasts until the next one is due: for the period of SYNC if each SYNC had a set-point, else for
+the interpolation time period 0x60C2.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ INTERPOLATION_ACTIVE = int(Statusword.INTERPOLATION_ACTIVE)
 
 
 class Streamed(Mode):
-    """Follows set-points that come at regular times.
+    """Follows set-points that arrive at regular times.
 
-    A drive that is enabled stands still until the first set-point is written; what the target
-    object held before is no set-point.
+    An enabled drive stands still until the first set-point is written; the earlier value of the
+    target object is not a set-point.
     """
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
@@ -44,12 +44,12 @@ class Streamed(Mode):
         return not self.halted
 
     def start(self, word: int, now: float) -> None:
-        """Stand still and wait for a set-point."""
+        """Stop and wait for a set-point."""
         super().start(word, now)
         self._fresh = self._streaming = False
 
     def halt(self, now: float) -> None:
-        """Forget a set-point that was not taken."""
+        """Discard a pending set-point."""
         self._fresh = self._streaming = False
 
     def setpoint(self, now: float) -> bool:
@@ -62,7 +62,7 @@ class Streamed(Mode):
         return self.take(self.objects.setpoint_period, now)
 
     def sync(self, now: float) -> bool:
-        """Apply the set-point that came since the last SYNC."""
+        """Apply the set-point received since the last SYNC."""
         fresh, self._fresh = self._fresh, False
         steady, self._streaming = self._streaming and fresh, fresh
         if not fresh:
@@ -78,7 +78,7 @@ class Streamed(Mode):
         """
 
     def go(self, wanted: int, period: float, now: float) -> bool:
-        """Go to a position within a period; return whether the motion has changed."""
+        """Move to a position within a period; return whether the motion has changed."""
         axis = self.axis
         axis.advance(now)
         target = self.objects.within_limits(wanted, axis.demand)
@@ -99,7 +99,7 @@ class CyclicPosition(Streamed):
     number = OperationMode.CYCLIC_POSITION
 
     def take(self, period: float, now: float) -> bool:
-        """Go to the set-point within a period."""
+        """Move to the set-point within a period."""
         objects = self.objects
         return self.go(objects.target_position.value + objects.position_offset.value, period, now)
 
@@ -135,8 +135,8 @@ class CyclicVelocity(Streamed):
 class InterpolatedPosition(Streamed):
     """Interpolated position mode, linear; bit 4 of the controlword enables it.
 
-    With a buffer of more than one record (0x60C4:02) the set-points wait in it, and each SYNC
-    takes one. Writing 0 to 0x60C4:06 empties it and keeps it shut until 1 is written.
+    With a buffer of more than one record (0x60C4:02), set-points are queued, and each SYNC takes
+    one. Writing 0 to 0x60C4:06 clears the buffer and disables it until 1 is written.
     """
 
     number = OperationMode.INTERPOLATED_POSITION
@@ -153,13 +153,13 @@ class InterpolatedPosition(Streamed):
         return self._enabled and not self.halted
 
     def start(self, word: int, now: float) -> None:
-        """Stand still; bit 4 may be set already."""
+        """Stop; bit 4 may be set already."""
         super().start(word, now)
         self._buffer.clear()
         self._enabled = bool(word & ENABLE_INTERPOLATION)
 
     def take(self, period: float, now: float) -> bool:
-        """Go to the interpolation data record 0x60C1:01 within a period."""
+        """Move to the interpolation data record 0x60C1:01 within a period."""
         return self.go(self.objects.interpolation_target.value, period, now)
 
     def setpoint(self, now: float) -> bool:
@@ -187,7 +187,7 @@ class InterpolatedPosition(Streamed):
             self._fresh = False
 
     def halt(self, now: float) -> None:
-        """Forget what was not taken."""
+        """Discard pending set-points."""
         super().halt(now)
         self._buffer.clear()
 
@@ -210,9 +210,9 @@ class InterpolatedPosition(Streamed):
 class TorqueMode(Mode):
     """Applies a torque in steps, each of which begins exactly where the one before has ended.
 
-    The axis makes a motion of it. Torques are in [0.1 % of the rated torque]. Software position
-    limits do not act on a torque; the highest speed does. During halt the axis is ramped down and
-    held in position.
+    The axis turns torque into motion. Torques are in [0.1 % of the rated torque]. Software
+    position limits do not apply; the highest speed does. During halt the axis ramps down and
+    holds its position.
     """
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
@@ -222,26 +222,26 @@ class TorqueMode(Mode):
 
     @property
     def waiting(self) -> bool:
-        """The torque acts on a motor that moves or may move."""
+        """Whether the torque acts on a motor that moves or may move."""
         return self.due < NEVER
 
     @property
     def torque(self) -> float | None:
-        """The torque that acts; None while the axis is held in position."""
+        """Applied torque; None while the axis is held in position."""
         return self._torque if self._acting else None
 
     @property
     def slope(self) -> float:
-        """How fast the torque may change per second, infinite for at once."""
+        """Greatest change of torque per second; infinite for steps."""
         return math.inf
 
     @property
     def wanted(self) -> float:
-        """The torque to reach, within its limits."""
+        """Target torque within its limits."""
         return 0.0
 
     def start(self, word: int, now: float) -> None:
-        """Hold the axis; the torque begins with the one that keeps its velocity."""
+        """Hold the axis; the torque starts at the value that keeps the velocity."""
         super().start(word, now)
         self._acting = False
 
@@ -266,7 +266,7 @@ class TorqueMode(Mode):
             self.act(now)
 
     def step(self, now: float) -> None:
-        """Apply the torque for another step, when one has ended."""
+        """Apply the torque for another step when the last one has ended."""
         axis = self.axis
         if now < self.due:
             return
@@ -332,7 +332,7 @@ class CyclicTorque(TorqueMode, Streamed):
         return self._target
 
     def halt(self, now: float) -> None:
-        """Forget set-points and hold the axis."""
+        """Discard set-points and hold the axis."""
         Streamed.halt(self, now)
         TorqueMode.halt(self, now)
 

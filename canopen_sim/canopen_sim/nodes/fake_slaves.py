@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 run canopen_sim fake_slaves``: simulated devices for all slaves of a bus.yml.
 
-Services of the node let them misbehave.
+Services of the node inject faults.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ parameters:
 """
 
 Populate = Callable[[Node, DeviceHost], tuple[str, Mapping[str, int]]]
-"""Adds the devices of a node; returns what they are in words, and their node ids by name."""
+"""Adds the devices of a node; returns their description, and their node ids by name."""
 
 
 def main() -> None:
@@ -85,8 +85,8 @@ def run_slaves(
 ) -> int:
     """Run the simulated devices of a node until Ctrl-C or SIGTERM; return the exit code.
 
-    ``populate`` reads the parameters of the node and adds the devices. It is 1 when they could
-    not be described or the bus not be opened.
+    ``populate`` reads the parameters of the node and adds the devices. The exit code is 1 if
+    this fails or the bus cannot be opened.
     """
 
     def body(stop: threading.Event) -> None:
@@ -123,7 +123,7 @@ def _run(node: Node, populate: Populate, stop: threading.Event) -> None:
 
 
 def memories(node: Node) -> Callable[[int], ParameterMemory]:
-    """Declare ``store_directory``; return a function that makes the memory of a node id."""
+    """Declare ``store_directory``; return a function that creates the memory of a node id."""
     folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
 
     def memory(node_id: int) -> ParameterMemory:
@@ -172,10 +172,10 @@ Work = Callable[[Device, float], str]
 
 
 class FaultServices:
-    """The services ``~/fault``, ``~/power_cycle`` and ``~/sto``, of all devices and of each."""
+    """The services ``~/fault``, ``~/power_cycle`` and ``~/sto``, for all devices and for each."""
 
     def __init__(self, node: Node, runner: DeviceRunner, names: Mapping[str, int]) -> None:
-        """Offer them; names are node ids by name."""
+        """Offer the services; ``names`` maps device names to node ids."""
         self._node = node
         self._runner = runner
         self._names = dict(names)
@@ -208,10 +208,10 @@ class FaultServices:
         return self._answer(response, lambda: self._do(name, partial(switch_sto, active)))
 
     def _do(self, name: str, work: Work) -> str:
-        """Do something with a device, or with all, in their thread.
+        """Run an action on a device, or on all devices, in their thread.
 
         Raises:
-            ValueError: There is no such device, or it cannot do that.
+            ValueError: The device is unknown, or does not support the action.
         """
         node_ids = self._node_ids(name)
 
@@ -258,7 +258,7 @@ def service_part(name: str) -> str:
 
 
 def injecting(injection: FaultInjection) -> Work:
-    """Return the work of beginning a fault."""
+    """Return an action that injects a fault."""
 
     def inject(device: Device, now: float) -> str:
         device.faults.inject(injection, now)
@@ -275,7 +275,7 @@ def end_faults(device: Device, now: float) -> str:
 
 
 def switch_sto(active: bool, device: Device, now: float) -> str:
-    """Request safe torque off of a drive, or release it.
+    """Activate or release safe torque off of a drive.
 
     Raises:
         ValueError: The device is not a drive.
