@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """bus.yml and EDS/DCF files -> a typed, checked model of a bus, in three steps.
 
-- ``read``: what stands in the files, with the place of each value.
-- ``resolve``: which value counts, and the model that comes of it.
+- ``read``: parses the files and keeps the line and key path of each value.
+- ``resolve``: decides which value counts and builds the model.
 - ``model``: typed values in SI units, their checks, and the boot plan.
 
-``model`` and ``sections`` declare each key of bus.yml, once.
+``model`` and ``sections`` declare each key of bus.yml exactly once.
 
-``load_bus`` goes all three for a bus, ``load_eds`` reads one device description. Both collect
-everything that is wrong and raise one ``ConfigError`` whose problems name file, line, key and
-remedy; ``check_file`` reports them, and what works and was probably meant otherwise.
+``load_bus`` runs all three steps for a bus, ``load_eds`` reads one device description. Both
+collect all errors and raise one ``ConfigError`` whose problems name file, line, key and remedy;
+``check_file`` reports the errors, and warns of settings that work but are probably unintended.
 """
 
 from canopen_core.eds import load_eds

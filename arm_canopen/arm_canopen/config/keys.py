@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a key of bus.yml is declared: once, as the field of the record that it fills."""
+"""Declaration of bus.yml keys: each one once, as the dataclass field that it fills."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KILOBIT = 1e-3  # kbit/s per bit/s
 
 
 class Kind(Enum):
-    """What stands behind a key."""
+    """Type of the value of a key."""
 
     INTEGER = auto()
     NUMBER = auto()
@@ -27,11 +27,11 @@ class Kind(Enum):
 
 
 class Use(Enum):
-    """What is made of a key."""
+    """How the master treats a key."""
 
     READ = auto()  # fills its field
-    IGNORED = auto()  # accepted: what it requests is so anyway
-    UNUSED = auto()  # warned of: known, not used yet; its field is for other tools' files
+    IGNORED = auto()  # accepted without effect: what it requests is always the case
+    UNUSED = auto()  # accepted with a warning; its field is for other tools' files
     REFUSED = auto()  # ignoring it would change motion or safety, so only its default is accepted
 
 
@@ -50,13 +50,13 @@ class Key:
     """A key of bus.yml."""
 
     default: Any  # in units of the model
-    text: str  # its meaning, for docs/bus_yml.md
+    text: str  # description for docs/bus_yml.md
     span: tuple[float, float] | None = None  # smallest and largest value, in units of the file
     # units of the file per unit of the model, 1000 for [ms]; None for no conversion
     unit: float | None = None
-    zero: bool | None = None  # True allows 0 beside the span, False refuses it
+    zero: bool | None = None  # True also allows 0 outside the span, False refuses 0
     choices: Mapping[Any, str] | None = None  # the only values allowed, with their meaning
-    form: re.Pattern[str] | None = None  # that a text must have; ``why`` says it
+    form: re.Pattern[str] | None = None  # pattern that a text must match, explained by ``why``
     use: Use = Use.READ
     why: str = ''  # reason for the default, the range or the use, as the user reads it
     name: str = ''
@@ -65,17 +65,17 @@ class Key:
 
     @property
     def is_kept(self) -> bool:
-        """Whether its value fills its field."""
+        """Whether the value of the key is stored in its field."""
         return self.kind is not Kind.BLOCK and self.use in {Use.READ, Use.UNUSED}
 
 
 def key(default: Any, text: str, span: tuple[float, float] | None = None, **more: Any) -> Any:  # noqa: ANN401
-    """Declare a field that a key fills; the key has the field's name and type unless given."""
+    """Declare a field filled by a key, which has its name and type unless ``more`` overrides."""
     return field(default=default, metadata={'key': Key(default, text, span, **more)})
 
 
 def keys_of(record: type) -> tuple[Key, ...]:
-    """Return the keys of a record, in their order."""
+    """Return the keys that a dataclass declares, in field order."""
     return tuple(
         replace(
             declared,

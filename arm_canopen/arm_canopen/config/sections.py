@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The sections of a bus.yml, each key once: with its type, unit, range, default and meaning.
+"""The sections of a bus.yml: each key once, with type, unit, range, default and description.
 
 Names, units and defaults are those of ros2_canopen and of Lely's dcfgen, so that their files can
-be read unchanged. Where a default differs, ``why`` says the reason. Our own are
+be read unchanged. If a default differs, ``why`` gives the reason. Keys not in either are
 ``scale_acc_to_dev``, ``scale_acc_from_dev``, ``scale_eff_to_dev``, ``scale_from_factor_group``,
 ``target_timeout_ms``, ``recovery``, ``quirks``, ``timeout_ms`` of an entry of ``sdo`` and
 ``time_period_ms`` of the master.
 
-A key that fills a field of the model is declared there, by ``MasterConfig``, ``NodeConfig`` and
-``DriveConfig``; the sections here have those that other sections or the EDS have a say in.
+``MasterConfig``, ``NodeConfig`` and ``DriveConfig`` declare the keys that fill their fields. The
+sections here declare the keys whose value also depends on other sections or the EDS.
 
-A field has a value for a key that is absent: the default of the model where that has the field,
-and None where other sections or the EDS decide.
+The field of an absent key is the default of the model if the model has that field, and None if
+other sections or the EDS decide.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class _NodeSettings:
 
 @dataclass(frozen=True, slots=True)
 class MasterSettings(_NodeSettings):
-    """Section ``master``, but for the keys that :class:`.model.MasterConfig` declares."""
+    """Section ``master``, except the keys that :class:`.model.MasterConfig` declares."""
 
     vendor_id: int = _own_identity(1)
     product_code: int = _own_identity(2)
@@ -106,7 +106,7 @@ class MasterSettings(_NodeSettings):
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings(_NodeSettings):
-    """Section of a device, but for the keys that :class:`.model.NodeConfig` declares."""
+    """Section of a device, except the keys that :class:`.model.NodeConfig` declares."""
 
     dcf: str = key(
         '',

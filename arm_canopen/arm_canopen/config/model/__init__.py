@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The typed model of a bus in SI units: what the master runs, the checks look at and boot writes.
+"""Typed model of a bus in SI units, used by the master, the configuration checks and the boot.
 
-It is made of plain values, and imports nothing that reads files.
+It consists of plain values and imports nothing that reads files.
 """
 
 from canopen_core import Place

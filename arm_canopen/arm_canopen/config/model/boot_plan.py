@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is written to a device at boot, and what it holds then: the one list of all that need it.
+"""Boot plan: the objects that the master writes to a device, and their values after the boot.
 
-Boot downloads :func:`boot_writes`, and a DCF holds them; take-over and ``canopen diff`` compare
-:func:`held_after_boot`.
+The boot downloads :func:`boot_writes`, and an exported DCF contains them; take-over and
+``canopen diff`` compare a device with :func:`held_after_boot`.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ class BootWrite:
 
     index: int
     subindex: int
-    data: bytes  # its value as an SDO carries it
-    key: str  # key of bus.yml, or file, that it comes from
-    requested: bool = True  # bus.yml has it; a refusal of other writes is no error
-    mask: int | None = None  # bits that count, None for all; the device keeps the others
-    temporary: bool = False  # it makes room for the writes that follow, and does not stay
-    unless_default: bool = False  # an exported DCF leaves it out where the EDS has it as default
-    fixed: bool = False  # the device has it for good, so it is not written
+    data: bytes  # value, encoded for SDO
+    key: str  # key of bus.yml, or file, that requests the write
+    requested: bool = True  # bus.yml requests it; if False, a refusal is no error
+    mask: int | None = None  # bits to write, None for all; the device keeps the others
+    temporary: bool = False  # a later write replaces it, such as 0 before a mapping
+    unless_default: bool = False  # an exported DCF omits it if it is the EDS default
+    fixed: bool = False  # the value is fixed in the device, so it is not written
 
     @property
     def address(self) -> tuple[int, int]:
@@ -74,26 +74,26 @@ class BootWrite:
 
     @property
     def is_own_timer(self) -> bool:
-        """Whether it sets the event timer of a TPDO without a request of bus.yml."""
+        """Whether it sets the event timer of a TPDO although bus.yml does not request it."""
         pdo, is_timer = pdo_object(self.index), self.subindex == EVENT_TIMER_SUBINDEX
         of_tpdo = pdo is not None and pdo.direction == TPDO.name and not pdo.is_mapping
         return of_tpdo and is_timer and not self.requested
 
     def text(self, held: bytes | None = None) -> str:
-        """Write the bits that count as a hexadecimal number: its own, or those of a device."""
+        """Format the masked bits of ``held``, or of its own data, as a hexadecimal number."""
         data = self.data if held is None else held
         value = int.from_bytes(data, 'little') & (self.mask if self.mask is not None else -1)
         return f'0x{value:0{2 * len(self.data)}X}'
 
     def over(self, present: int) -> bytes:
-        """Return the data with the bits that do not count as they are in a present value."""
+        """Return the data, with the bits outside the mask taken from the present value."""
         if self.mask is None:
             return self.data
         value = present & ~self.mask | int.from_bytes(self.data, 'little') & self.mask
         return value.to_bytes(len(self.data), 'little')
 
     def fits(self, held: bytes) -> bool:
-        """Return whether a value of the device is what is wanted."""
+        """Return whether a value read from the device matches the data within the mask."""
         pdo = pdo_object(self.index)
         if pdo is not None and pdo.is_mapping and self.subindex and held:
             held = bytes((held[0] & MAPPED_LENGTH_MASK,)) + held[1:]
@@ -105,10 +105,10 @@ class BootWrite:
 def boot_writes(
     bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
-    """Return everything that is written to a device at boot, in this order.
+    """Return all writes to a device at boot, in the order of writing.
 
-    What the device holds in 0x1016 is read while :func:`consumer_to_read` names an entry; None
-    takes it from its EDS.
+    ``consumers`` holds the entries of 0x1016 that were read from the device for
+    :func:`consumer_to_read`; None uses the values of the EDS.
     """
     return list(_writes(bus, node, consumers))
 
@@ -116,9 +116,9 @@ def boot_writes(
 def held_after_boot(
     bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
-    """Return what the device holds after its boot: what was written, and mappings that it has.
+    """Return the objects of the device after its boot: all writes, and fixed mappings.
 
-    Consumers are those of :func:`boot_writes`.
+    ``consumers`` is as for :func:`boot_writes`.
     """
     fixed = (
         write
@@ -131,22 +131,22 @@ def held_after_boot(
 
 
 def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
-    """Return whether bus.yml has a key of a device; a bus that was built by a program has all."""
+    """Return whether bus.yml has a key of a device; True for a bus that a program built."""
     return not bus.locations or (node.name, *keys) in bus.locations
 
 
 def consumer_to_read(bus: BusConfig, node: NodeConfig, held: HeldConsumers) -> int | None:
-    """Return the entry of 0x1016 to read next after those held; None: the master's is known."""
+    """Return the entry of 0x1016 to read next; None once the entry for the master is known."""
     for subindex in _watch_slots(bus, node):
         if subindex not in held:
             return subindex
         if held[subindex] is None or _is_free(held, subindex, bus.master.node_id):
-            return None  # entries behind one that cannot be read are promised by the EDS only
+            return None  # only the EDS says that entries after an unreadable one exist
     return None
 
 
 def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
-    """Return the entries of 0x1016 that may be the master's: no file has another use for them."""
+    """Return the entries of 0x1016 available for the master: no file uses them otherwise."""
     others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
     for subindex, word in _consumers_of_dcf(node).items():
         if not _is_free_word(word, bus.master.node_id):
@@ -159,19 +159,19 @@ def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
 
 
 def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
-    """Return whether an entry of 0x1016 is free; the first is where it cannot be read."""
+    """Return whether an entry of 0x1016 is free; an unreadable one only if it is the first."""
     word = held.get(subindex)
     return subindex == 1 if word is None else _is_free_word(word, master_id)
 
 
 def _is_free_word(word: int, master_id: int) -> bool:
-    """Return whether an entry of 0x1016 is unused, or the master's."""
+    """Return whether an entry of 0x1016 is unused or watches the master."""
     entry = ConsumerHeartbeatTime.parse(word)
     return entry.node_id == master_id or not entry.used
 
 
 def watch_word(bus: BusConfig, node: NodeConfig) -> int:
-    """Return what the entry of 0x1016 for the master shall hold; 0 for not to watch it."""
+    """Return the value for the master's entry of 0x1016; 0 if the device must not watch it."""
     time = round(bus.master.heartbeat_timeout * MILLISECONDS)
     watched = node.heartbeat_consumer and time
     return ConsumerHeartbeatTime(bus.master.node_id, time).word if watched else 0
@@ -192,7 +192,7 @@ def _writes(
     for pdo in node.rpdos + node.tpdos:
         if pdo.configured:
             yield from _pdo(bus, node, pdo)
-        elif pdo.event_time is not None:  # of a TPDO that is otherwise left as the device has it
+        elif pdo.event_time is not None:  # a TPDO whose other parameters stay as in the device
             for parameter in _parameters(bus, node, pdo):
                 if parameter.subindex == EVENT_TIMER_SUBINDEX:
                     yield parameter
@@ -203,12 +203,12 @@ def _writes(
 def _watch(
     bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None
 ) -> Iterator[BootWrite]:
-    """Make the device watch the master, or stop it, in the first entry that is free."""
+    """Write the first free entry of 0x1016, so that the device watches the master or stops to."""
     master_id, index = bus.master.node_id, Index.CONSUMER_HEARTBEAT
     slots = _watch_slots(bus, node)
     if consumers is None:
         consumers = {slot: node.dictionary.number(index, slot) or 0 for slot in slots}
-    entries = {**consumers, **_consumers_of_dcf(node)}  # which was written before
+    entries = {**consumers, **_consumers_of_dcf(node)}  # the DCF is written earlier
     slot = next((sub for sub in slots if sub in entries and _is_free(entries, sub, master_id)), 0)
     word = watch_word(bus, node)
     own = ConsumerHeartbeatTime.parse(entries.get(slot) or 0).node_id == master_id
@@ -218,7 +218,7 @@ def _watch(
 
 
 def _error_control(bus: BusConfig, node: NodeConfig) -> Iterator[BootWrite]:
-    """Set the heartbeat of the device, and node guarding (CiA 301, 7.2.8)."""
+    """Configure heartbeat and node guarding of the device (CiA 301, 7.2.8)."""
     period, guard_time = (
         round(time * MILLISECONDS) for time in (node.heartbeat_producer, node.guard_time)
     )
@@ -281,7 +281,7 @@ def _parameters(bus: BusConfig, node: NodeConfig, pdo: PdoConfig) -> Iterator[Bo
 def _mapping(
     pdo: PdoConfig, key: str, *, requested: bool = True, fixed: bool = False
 ) -> Iterator[BootWrite]:
-    """Yield the mapped objects, and then their number."""
+    """Yield the writes of the mapped objects, then that of their number."""
     index, count = pdo.mapping_index, len(pdo.mapping)
     for subindex, mapped in enumerate(pdo.mapping, start=1):
         data = encode(DataType.UNSIGNED32, mapped.word)
@@ -291,10 +291,10 @@ def _mapping(
 
 
 def _is_given(bus: BusConfig, node: NodeConfig, pdo: PdoConfig, key: str) -> bool:
-    """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
+    """Return whether bus.yml sets a key of a PDO, or a DCF sets the object."""
     if is_requested(bus, node, pdo.direction.name, str(pdo.number), key):
         return True
-    if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
+    if key == TIMER_KEY:  # a DCF with other parameters may omit it
         entry = node.dictionary.get(pdo.communication, EVENT_TIMER_SUBINDEX)
         return entry is not None and entry.configured
     index = pdo.mapping_index if key == 'mapping' else pdo.communication
@@ -302,7 +302,7 @@ def _is_given(bus: BusConfig, node: NodeConfig, pdo: PdoConfig, key: str) -> boo
 
 
 def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
-    """Return the entries of 0x1016 that are written from a DCF, before that for the master."""
+    """Return the entries of 0x1016 that a DCF sets; they are written before the master's."""
     return {
         write.subindex: int.from_bytes(write.data, 'little')
         for write in node.parameter_writes
@@ -311,7 +311,7 @@ def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
 
 
 def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
-    """Yield the COB-IDs that the device should have by its node id, though not by its EDS."""
+    """Yield the COB-IDs expected from the node id where the EDS states others."""
     for pdo in node.pdos:
         if pdo.assumed and pdo.enabled and not pdo.configured:
             data = encode(DataType.UNSIGNED32, pdo.cob_id)
@@ -319,7 +319,7 @@ def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:
-    """Yield a write of a file; before a COB-ID one that ends its service, which fixes it."""
+    """Yield a write from a file, preceded for a COB-ID by one that disables its service."""
     address, place = (write.index, write.subindex), write.place
     key = f'{place.key} (line {place.line})' if place.line else place.key or 'bus.yml'
     value = int.from_bytes(write.data, 'little')
@@ -328,7 +328,7 @@ def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootW
         off |= value & ~mask
         ended = encode(DataType.UNSIGNED32, off)
         yield BootWrite(*address, ended, key, mask=mask, temporary=True)
-        unless_default = False  # or an exported DCF would leave it ended
+        unless_default = False  # else an exported DCF would leave the service disabled
     yield BootWrite(*address, write.data, key, unless_default=unless_default)
 
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The typed model of a bus: bus.yml and the EDS files, checked and in SI units.
 
-A TPDO that comes on change only is silent when nothing changes, and when it gets lost. With an
-event timer (CiA 301, 7.5.2.37) it comes all the time, so one is set where the device has it.
+A TPDO that is sent only on change is silent when nothing changes, and also when it gets lost. An
+event timer (CiA 301, 7.5.2.37) makes it periodic, so the master sets one if the device has it.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ from ..keys import HUNDRED_MICROSECONDS, key, KILOBIT, Kind, MICROSECONDS, MILLI
 from .drive import DriveConfig
 
 PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
-STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
-EVENT_TIME_MAX = 0.1  # [s] of an event timer by default
-INHIBIT_FACTOR = 2.0  # inhibit times that an event timer lasts at least
+STALE_AFTER = 0.5  # [s] shortest time without a new value after which a TPDO is stale
+EVENT_TIME_MAX = 0.1  # [s] longest event timer set by default
+INHIBIT_FACTOR = 2.0  # shortest event timer, in inhibit times
 INHIBIT_TIME_SUBINDEX = 3  # of the communication parameter
 EVENT_TIMER_SUBINDEX = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """One of the two directions, seen from the device."""
+    """A PDO direction (TPDO or RPDO), seen from the device."""
 
     name: str  # key in bus.yml
     communication: int  # index of the first communication parameter
@@ -66,7 +66,7 @@ class Direction:
         return self.name.upper()
 
     def numbers(self, dictionary: ObjectDictionary) -> list[int]:
-        """Return the numbers of the PDOs that a device has, ascending."""
+        """Return the PDO numbers of a device in ascending order."""
         first = self.communication
         indices = {entry.index for entry in dictionary}
         return sorted(
@@ -107,10 +107,10 @@ class PdoConfig:
     sync_start: int | None = None
     mapping: tuple[MappedObject, ...] = ()
     configured: bool = False  # bus.yml names this PDO, so the master writes it at boot
-    fixed_mapping: bool = False  # the device's mapping is read-only (and equal to ``mapping``)
-    # the EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one
+    fixed_mapping: bool = False  # the mapping in the device is read-only and equals ``mapping``
+    # the EDS states the COB-ID of another node id; ``cob_id`` is the one for this node id
     assumed: bool = False
-    # where bus.yml has its COB-ID, else the PDO or the device
+    # place of its COB-ID in bus.yml, else of the PDO or the device
     place: Place = field(default=Place(), compare=False)
 
     @property
@@ -135,7 +135,7 @@ class PdoConfig:
 
 
 def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
-    """Return a TPDO of a drive with an event timer, if it needs one and has none."""
+    """Return the PDO, with an event timer added if it carries drive state and needs one."""
     index = pdo.communication
     entry = dictionary.get(index, EVENT_TIMER_SUBINDEX)
     chosen = pdo.event_time is not None or pdo.transmission < EVENT_DRIVEN
@@ -150,9 +150,9 @@ def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
 
 
 def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
-    """Return the time in [s] after which a TPDO counts as lost; infinite where that is unknown.
+    """Return the time in [s] after which a TPDO counts as lost; infinite if it may stay silent.
 
-    The SYNC period in [s] is 0 where this master sends none.
+    ``sync_period`` is in [s], 0 if this master sends no SYNC.
     """
     if 1 <= pdo.transmission <= SYNCHRONOUS_MAX and sync_period > 0.0:
         return max(STALE_AFTER, PERIODS_MISSED * pdo.transmission * sync_period)
@@ -162,7 +162,7 @@ def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
 
 
 def loss_unnoticed(pdo: PdoConfig, silence: float) -> bool:
-    """Return whether nothing shows that a drive's state got lost for silence [s] in a TPDO."""
+    """Return whether a lost TPDO with drive state goes unnoticed; ``silence`` is in [s]."""
     return silence == math.inf and _carries_state(pdo)
 
 
@@ -176,7 +176,7 @@ BITRATES = dict.fromkeys(BIT_RATES_KBIT, 'kbit/s')
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The identity of a device, 0x1000 and 0x1018; 0 is not checked."""
+    """Expected identity of a device (0x1000 and 0x1018); a value of 0 is not checked."""
 
     device_type: int = 0
     vendor_id: int = 0
@@ -186,7 +186,7 @@ class Identity:
 
     @property
     def objects(self) -> Iterator[tuple[str, int, int, int]]:
-        """Attribute, index, sub-index and value of what is checked."""
+        """Yield attribute, index, sub-index and value of each object to check."""
         for attribute, index, subindex in IDENTITY_OBJECTS:
             value = getattr(self, attribute)
             if value:
@@ -204,7 +204,7 @@ ANY_DEVICE = Identity()
 
 
 POLL_PERIOD = 0.01  # [s]
-CYCLE_PERIOD = 0.01  # [s] without SYNC, and where no device says how often it is read
+CYCLE_PERIOD = 0.01  # [s] used without SYNC if no device sets a ``period``
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,19 +285,19 @@ class MasterConfig:
         2.0, 'time-out of each SDO of the boot', (1, 60_000), unit=MILLISECONDS
     )
     time_period: float = 0.0  # period of TIME in [s]; 0 sends none
-    # period of the control cycle in [s]: that of SYNC, without one the shortest ``period`` of a
-    # device
+    # period of the control cycle in [s]: the SYNC period, or without SYNC the shortest ``period``
+    # of a device
     cycle_period: float = CYCLE_PERIOD
-    # how long a device that watches the master waits for its heartbeat in [s], for 0x1016; 0 when
-    # there is none
+    # heartbeat consumer time in [s] for devices that watch the master (0x1016); 0 if it sends no
+    # heartbeat
     heartbeat_timeout: float = 0.0
-    # 0x1029 of the master by sub-index: what it does when it loses a device
+    # 0x1029 of the master by sub-index: its reaction to the loss of a device
     error_behavior: dict[int, int] = field(default_factory=dict)
     identity: Identity = ANY_DEVICE  # 0x1018 of the master, for the files of other tools
 
     @property
     def is_lifecycle(self) -> bool:
-        """The master and its devices are lifecycle nodes."""
+        """Whether the master and its devices are lifecycle nodes."""
         return 'Lifecycle' in self.driver
 
 
@@ -306,14 +306,14 @@ RETRY_FACTOR = 3
 
 @dataclass(frozen=True, slots=True)
 class SdoWrite:
-    """An object to be written at boot."""
+    """An object that the master writes at boot."""
 
     index: int
     subindex: int
-    data: bytes  # the value as it is sent
-    # how long the device may take for it in [s]; None as for any object
+    data: bytes  # value, encoded for SDO
+    # time-out of this write in [s]; None for the usual one
     timeout: float | None = None
-    place: Place = field(default=Place(), compare=False)  # where bus.yml has it
+    place: Place = field(default=Place(), compare=False)  # place in bus.yml
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,15 +328,15 @@ class NodeConfig:
     namespace: str = ''  # ROS namespace, empty for none
     remappings: dict[str, str] = field(default_factory=dict)  # ROS remappings, from name to name
     identity: Identity = ANY_DEVICE
-    # period of the device's heartbeat in [s], as bus.yml or else the EDS says; 0 for none
+    # heartbeat period of the device in [s], from bus.yml or else the EDS; 0 for none
     heartbeat_producer: float = 0.0
-    # how long the master waits for a heartbeat in [s]; 0 for no supervision
+    # heartbeat consumer time of the master in [s]; 0 for no supervision
     heartbeat_timeout: float = 0.0
-    # the device shall watch the master's heartbeat; it then has 0x1016 and the master sends one
+    # the device watches the heartbeat of the master (the device has 0x1016, the master sends one)
     heartbeat_consumer: bool = False
     guard_time: float = 0.0  # period of node guarding in [s]; 0 for none
-    life_time_factor: int = 0  # guard times after which either side takes the other for lost
-    retry_factor: int = RETRY_FACTOR  # missing answers after which a guarded device counts as lost
+    life_time_factor: int = 0  # guard times without a message until either side counts as lost
+    retry_factor: int = RETRY_FACTOR  # missed answers after which a guarded device counts as lost
     boot: bool = key(
         True,
         'false: the device is taken as it is, neither reset nor configured nor started',
@@ -378,14 +378,14 @@ class NodeConfig:
     rpdos: tuple[PdoConfig, ...] = ()  # all RPDOs of the device, by ascending number
     # ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the order of writing
     sdo_writes: tuple[SdoWrite, ...] = ()
-    # what its DCF wants written before all else: ParameterValues that are not the defaults
+    # ParameterValues of its DCF that differ from the defaults; they are written first
     parameter_writes: tuple[SdoWrite, ...] = ()
     # the axes of a CiA 402 drive, by ascending channel
     axes: tuple[DriveConfig, ...] = (DriveConfig(),)
     line: int = 0  # line of bus.yml at which the node begins
 
     def write_of(self, index: int, subindex: int) -> SdoWrite | None:
-        """Return the last write of an object in bus.yml."""
+        """Return the last write of an object in bus.yml, or None."""
         for write in reversed(self.sdo_writes):
             if (write.index, write.subindex) == (index, subindex):
                 return write
@@ -393,14 +393,14 @@ class NodeConfig:
 
     @property
     def emergency_id(self) -> int | None:
-        """Identifier of its EMCYs (CiA 301, 7.5.2.17); None when it shall send none."""
+        """COB-ID of its EMCY messages (CiA 301, 7.5.2.17); None if EMCY is disabled."""
         value = self.value_after_boot(Index.EMCY_COB_ID, data_type=DataType.UNSIGNED32)
         if not isinstance(value, int):
             return CobId.EMCY + self.node_id
         return None if value & COB_ID_INVALID else value & CAN_ID_MASK
 
     def write_timeout(self, index: int, subindex: int, usual: float | None = None) -> float:
-        """Return how long the device may take for a write in [s], usually sdo_timeout."""
+        """Return the time-out of a write in [s]; ``usual`` replaces sdo_timeout as its default."""
         write = self.write_of(index, subindex)
         if write is not None and write.timeout is not None:
             return write.timeout
@@ -409,12 +409,12 @@ class NodeConfig:
     def value_after_boot(
         self, index: int, subindex: int = 0, data_type: DataType | None = None
     ) -> Value | None:
-        """Return what an object holds after boot by the files; None where no file has it.
+        """Return the value of an object after boot, by the files; None if no file defines it.
 
-        The data type is for an object that the EDS lacks.
+        ``data_type`` decodes an object that the EDS lacks.
 
         Raises:
-            CodecError: What is written to it at boot does not fit its type.
+            CodecError: The value written at boot does not fit the type of the object.
         """
         entry = self.dictionary.get(index, subindex)
         write = self.write_of(index, subindex)
@@ -434,12 +434,12 @@ class NodeConfig:
 
     @property
     def uses_node_guarding(self) -> bool:
-        """The master requests its NMT state; never together with a heartbeat (CiA 301)."""
+        """Whether the master uses node guarding; never together with a heartbeat (CiA 301)."""
         return self.guard_time > 0.0 and not self.heartbeat_producer
 
     @property
     def life_guarding(self) -> bool:
-        """Whether the device takes the master for lost without its guarding requests."""
+        """Whether the device supervises the guarding requests of the master (life guarding)."""
         return self.uses_node_guarding and self.life_time_factor > 0
 
     @property
@@ -449,12 +449,12 @@ class NodeConfig:
 
     @property
     def is_lifecycle(self) -> bool:
-        """Its node is a lifecycle node."""
+        """Whether its ROS node is a lifecycle node."""
         return 'Lifecycle' in self.driver
 
     @property
     def commanded_indices(self) -> frozenset[int]:
-        """Objects that the driver of the device writes in each cycle."""
+        """Indices of the objects that its driver writes in each cycle."""
         if not self.is_drive:
             return frozenset()
         return frozenset(
@@ -463,34 +463,34 @@ class NodeConfig:
 
     @property
     def is_drive(self) -> bool:
-        """The device is driven by the CiA 402 driver."""
+        """Whether the device uses the CiA 402 driver."""
         return 'Cia402' in self.driver
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints that it drives: its own, or those of its channels."""
+        """Names of its joints: its own name, or those of its channels."""
         return tuple(axis.name for axis in self.axes) if self.is_drive else ()
 
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """A whole bus."""
+    """A bus: its master, devices and warnings."""
 
     file: Path  # the bus.yml that it was read from
     master: MasterConfig
     nodes: tuple[NodeConfig, ...]  # the devices in the order of the file
-    warnings: tuple[Problem, ...] = ()  # what was odd but could be understood
-    # where each key stands, by the names that lead to it: ``('master', 'node_id')``, ``('joint1',
-    # 'tpdo', '1', 'mapping')``; defaults belong to every device
+    warnings: tuple[Problem, ...] = ()  # oddities in the file that prevent nothing
+    # place of each key in the file, by its key path: ``('master', 'node_id')``, ``('joint1',
+    # 'tpdo', '1', 'mapping')``; keys of ``defaults`` are listed for every device
     locations: Mapping[tuple[str, ...], Place] = field(default_factory=dict, compare=False)
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of all joints that its drives have, in the order of the file."""
+        """Names of all joints of its drives, in the order of the file."""
         return tuple(joint for node in self.nodes for joint in node.joints)
 
     def place_of(self, *names: str) -> Place:
-        """Return where a key stands, or else the nearest thing around it that does."""
+        """Return the place of a key, or of the nearest enclosing key that the file has."""
         for length in range(len(names), 0, -1):
             if (place := self.locations.get(names[:length])) is not None:
                 return place

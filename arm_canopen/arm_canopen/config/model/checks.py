@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of a bus.yml as a whole, beyond what each file by itself allows.
 
-``load_bus`` refuses what cannot be understood or cannot run. Here is looked for what runs and
-disappoints: what devices and master expect of each other, and a bus that is full. The checks of
-each device are in ``device_checks`` and ``drive_units``.
+``load_bus`` refuses files that are invalid or cannot run. The checks here find settings that run
+but do not work as intended: mismatches between devices and master, and an overloaded bus. Checks
+of single devices are in ``device_checks`` and ``drive_units``.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from .bus import BusConfig, NodeConfig, PdoConfig, TPDO
 from .device_checks import check_drive, check_io_device, check_pdos, Subject
 from .drive_units import axis_units, AxisUnits, check_units
 
-HIGH_LOAD = 0.7  # share of the time above which frames of low priority begin to wait noticeably
+HIGH_LOAD = 0.7  # bus load above which frames of low priority are delayed noticeably
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What was found."""
+    """Result of checking a bus."""
 
-    errors: tuple[Problem, ...]  # what cannot work
-    warnings: tuple[Problem, ...]  # what works, and probably not as it was meant
-    # what the bus will carry, None when the file could not be read
+    errors: tuple[Problem, ...]  # settings that cannot work
+    warnings: tuple[Problem, ...]  # settings that work but are probably unintended
+    # estimated bus load, None if the file could not be read
     load: LoadEstimate | None = None
-    units: tuple[AxisUnits, ...] = ()  # what 1.0 means for each axis of a drive
+    units: tuple[AxisUnits, ...] = ()  # meaning of a target of 1.0 for each axis
 
 
 def check_bus(
@@ -51,7 +51,7 @@ def check_bus(
 ) -> Report:
     """Check a bus as a whole.
 
-    The bit rate in [bit/s] replaces that of bus.yml. Findings have what was found before.
+    ``bitrate`` in [bit/s] overrides bus.yml; ``findings`` holds the problems found so far.
     """
     findings = Findings() if findings is None else findings
     subjects = [Subject(config, node, findings) for node in config.nodes]
@@ -86,7 +86,7 @@ def _check_load(config: BusConfig, load: LoadEstimate, findings: Findings) -> No
         findings.warning(place, message, remedy)
 
 
-LATE_FACTOR = 1.5  # heartbeat periods that a consumer has to wait at least
+LATE_FACTOR = 1.5  # shortest consumer time, in heartbeat periods
 
 
 def check_master(config: BusConfig, findings: Findings) -> None:
@@ -111,7 +111,7 @@ def check_master(config: BusConfig, findings: Findings) -> None:
 
 
 def check_heartbeats(subject: Subject) -> None:
-    """Check who watches a device, and whom it watches."""
+    """Check the heartbeat supervision between a device, the master and other nodes."""
     node = subject.node
     producer = node.heartbeat_producer
     if not producer and not node.uses_node_guarding:
@@ -159,7 +159,7 @@ def _check_watches_master(subject: Subject) -> None:
 
 
 def _check_first_boot(subject: Subject) -> None:
-    """Warn when a device that was switched on before the master would wait for a reset."""
+    """Warn if a device that is powered up before the master would not boot without a reset."""
     node = subject.node
     producer = node.dictionary.get(Index.PRODUCER_HEARTBEAT)
     says_state = node.uses_node_guarding or node.dictionary.get(Index.GUARD_TIME) is not None
@@ -176,7 +176,7 @@ def _check_first_boot(subject: Subject) -> None:
 
 
 def _check_consumer_limit(subject: Subject) -> None:
-    """Compare what boot writes to 0x1016 with what the EDS says that the device takes."""
+    """Check the 0x1016 entry written at boot against the limits of the EDS."""
     node = subject.node
     for write in boot_writes(subject.bus, node):
         entry = node.dictionary.get(*write.address)
@@ -194,7 +194,7 @@ def _check_consumer_limit(subject: Subject) -> None:
 
 
 def check_sync(subject: Subject) -> None:
-    """Check that device and master mean the same SYNC."""
+    """Check that device and master use the same SYNC settings."""
     master = subject.bus.master
     sync = subject.value(Index.SYNC_COB_ID)
     if sync is not None and sync & SYNC_PRODUCER:
@@ -251,7 +251,7 @@ def check_writes(subject: Subject) -> None:
 
 
 def check_identifiers(subjects: Sequence[Subject]) -> None:
-    """Refuse identifiers that two services have, and services where the master does not look."""
+    """Refuse COB-IDs used by two services, and EMCYs where the master does not listen."""
     owners: dict[int, tuple[str, Place]] = {}
     for subject in subjects:
         for pdo in subject.pdos():
@@ -275,7 +275,7 @@ def check_identifiers(subjects: Sequence[Subject]) -> None:
 
 
 def _check_emergency(subject: Subject) -> None:
-    """Report an EMCY COB-ID of another node id; one without any is usual, the device adds its."""
+    """Warn if the EMCY COB-ID of the EDS belongs to another node id; 0 and 0x80 are usual."""
     entry, node = subject.node.dictionary.get(Index.EMCY_COB_ID), subject.node
     if entry is None or entry.literal is None or node.write_of(Index.EMCY_COB_ID, 0) is not None:
         return
@@ -296,32 +296,32 @@ POLLED = (Index.STATUSWORD, Index.MODE_OF_OPERATION_DISPLAY, Index.POSITION_ACTU
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Frames of one service."""
+    """Bus traffic of one service."""
 
-    device: str  # name of the device whose service it is, or of the master
-    service: str  # what they are: ``TPDO 1``, ``SYNC``, ``heartbeat``
-    cob_id: int  # their identifier
-    size: int  # length of the payload in [byte]
+    device: str  # name of the device, or of the master
+    service: str  # such as ``TPDO 1``, ``SYNC``, ``heartbeat``
+    cob_id: int  # COB-ID
+    size: int  # payload of a frame in [byte]
     rate: float  # frames in [1/s]
-    reason: str  # why so many
+    reason: str  # what determines the rate
 
     @property
     def bits(self) -> float:
-        """Bits on the bus in [bit/s], with the stuffing of random content."""
+        """Bits on the bus in [bit/s], with the stuff bits of random data."""
         return self.rate * (frame_bits(self.size) + stuff_bits_mean(self.size))
 
     @property
     def bits_worst(self) -> float:
-        """Bits on the bus in [bit/s], with the most stuffing that is possible."""
+        """Bits on the bus in [bit/s], with the largest possible number of stuff bits."""
         return self.rate * (frame_bits(self.size) + stuff_bits_worst(self.size))
 
 
 @dataclass(frozen=True, slots=True)
 class LoadEstimate:
-    """What a bus will carry when every device is operational.
+    """Estimated bus load when every device is operational.
 
-    SDO that polls nothing, EMCY and NMT come on top; they are rare, and let everything cyclic
-    pass.
+    It excludes EMCY, NMT and SDO transfers other than polling: they are rare, and have a small
+    effect on cyclic traffic.
     """
 
     bitrate: int  # bit rate in [bit/s]
@@ -329,22 +329,22 @@ class LoadEstimate:
 
     @property
     def frames_per_second(self) -> float:
-        """All frames in [1/s]."""
+        """Total frame rate in [1/s]."""
         return sum(item.rate for item in self.traffic)
 
     @property
     def load(self) -> float:
-        """Share of the time that the bus is busy, with the stuffing of random content."""
+        """Share of time that the bus is busy, with the stuff bits of random data."""
         return sum(item.bits for item in self.traffic) / self.bitrate
 
     @property
     def load_worst(self) -> float:
-        """The same with the most stuffing that is possible."""
+        """Share of time that the bus is busy, with the largest number of stuff bits."""
         return sum(item.bits_worst for item in self.traffic) / self.bitrate
 
 
 def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate:
-    """Estimate the load of a bus; the bit rate in [bit/s] replaces that of bus.yml."""
+    """Estimate the load of a bus; ``bitrate`` in [bit/s] overrides bus.yml."""
     traffic = [*_master_traffic(config)]
     for node in config.nodes:
         subject = Subject(config, node, Findings())
@@ -363,7 +363,7 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
 def _periodic(
     device: str, service: str, cob_id: int, size: int, period: float
 ) -> Iterator[Traffic]:
-    """Yield what a device sends on time; a period of 0 is never."""
+    """Yield a periodic service of a device; none for a ``period`` of 0 (in [s])."""
     if period > 0:
         yield Traffic(device, service, cob_id, size, 1 / period, f'every {period * 1e3:g} ms')
 
@@ -379,7 +379,7 @@ def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
 
 
 def _guarding(node: NodeConfig) -> Iterator[Traffic]:
-    """Yield question and answer of node guarding (CiA 301, 7.2.8.2.2)."""
+    """Yield request and response of node guarding (CiA 301, 7.2.8.2.2)."""
     if node.uses_node_guarding:
         for size in (0, 1):
             cob_id = CobId.HEARTBEAT + node.node_id
@@ -387,14 +387,14 @@ def _guarding(node: NodeConfig) -> Iterator[Traffic]:
 
 
 def _polling(subject: Subject) -> Iterator[Traffic]:
-    """Yield request and response of the objects of a drive that no TPDO carries."""
+    """Yield SDO request and response of polled drive objects, which no TPDO carries."""
     node, cycle = subject.node, subject.bus.master.cycle_period
     axes = node.axes if node.is_drive else ()
     indices = [index + AXIS_OFFSET * axis.channel for axis in axes for index in POLLED]
     for index in indices:
         if subject.carriers(TPDO, index) or node.dictionary.get(index, 0) is None:
             continue
-        # the answers are there in the next cycle, and the time to the next reading begins
+        # answers arrive in the next cycle, which starts the next period
         rate = 1 / (node.poll_period + cycle)
         service, reason = f'SDO {object_address(index)}', 'polled, as no TPDO carries it'
         for cob_id in (CobId.SDO_REQUEST, CobId.SDO_RESPONSE):
@@ -402,7 +402,7 @@ def _polling(subject: Subject) -> Iterator[Traffic]:
 
 
 def _rate(subject: Subject, pdo: PdoConfig) -> tuple[float, str]:
-    """Return how often a PDO is sent in [1/s], and why."""
+    """Return the rate of a PDO in [1/s], and the reason for it."""
     master = subject.bus.master
     if pdo.direction is not TPDO:
         if not subject.node.is_drive:
@@ -418,7 +418,7 @@ def _rate(subject: Subject, pdo: PdoConfig) -> tuple[float, str]:
         )
     if pdo.transmission < 254:
         return 0.0, 'on remote frames, which the master does not send'
-    # on change is taken as once a cycle, as far as the inhibit time allows
+    # sent on change: assume once per cycle, limited by the inhibit time
     inhibit, timer = subject.inhibit_time(pdo), subject.event_time(pdo)
     on_change = max(master.cycle_period, inhibit)
     if timer and timer <= on_change:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of single devices: PDOs that contradict each other, drives that lack objects."""
+"""Checks of single devices: conflicting PDOs, and drives with missing objects."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ from .drive import DriveConfig
 
 @dataclass(frozen=True, slots=True)
 class UsedMode:
-    """A mode in which an axis is used by bus.yml."""
+    """A mode of operation that bus.yml names for an axis."""
 
     axis: DriveConfig
     mode: OperationMode
     key: str  # key of bus.yml that names it
 
     def at(self, index: int) -> int:
-        """Return the index of an object of the profile for this axis."""
+        """Return the index of a CiA 402 object, shifted to this axis."""
         return index + AXIS_OFFSET * self.axis.channel
 
 
@@ -60,10 +60,10 @@ class Subject:
 
     bus: BusConfig
     node: NodeConfig
-    findings: Findings  # gets what is wrong
+    findings: Findings  # collects the problems found
 
     def place(self, *names: str) -> Place:
-        """Return the place of a key of the device, or of the nearest thing around it."""
+        """Return the place of a key of the device, or of the nearest enclosing key."""
         place = self.bus.place_of(self.node.name, *names)
         return place if place.line else replace(place, line=self.node.line)
 
@@ -72,7 +72,7 @@ class Subject:
         return self.place(pdo.direction.name, str(pdo.number), *key)
 
     def object_place(self, index: int, subindex: int) -> Place:
-        """Return the place of the value of an object: the sdo list, or else the EDS."""
+        """Return the place that sets an object: the ``sdo`` list, or else the EDS."""
         write = self.node.write_of(index, subindex)
         if write is not None:
             return write.place
@@ -81,14 +81,14 @@ class Subject:
         return Place(self.node.eds, line, f'[{index:04X}sub{subindex:X}]')
 
     def value(self, index: int, subindex: int = 0) -> int | None:
-        """Return the number that an object holds after boot, None when no file has it."""
+        """Return the value of an object after boot, None if no file defines it."""
         if self.node.dictionary.get(index, subindex) is None:
             return None
         value = self.node.value_after_boot(index, subindex)
         return value if isinstance(value, int) else None
 
     def used_modes(self) -> Iterator[UsedMode]:
-        """Yield the modes that bus.yml names for the axes of a drive."""
+        """Yield the modes of operation that bus.yml names for the axes of a drive."""
         for axis in self.node.axes if self.node.is_drive else ():
             for key in ('position_mode', 'velocity_mode', 'effort_mode'):
                 number = getattr(axis, key)
@@ -96,11 +96,11 @@ class Subject:
                     yield UsedMode(axis, OperationMode(number), key)
 
     def pdos(self) -> list[PdoConfig]:
-        """Return the PDOs that are in use."""
+        """Return the enabled PDOs."""
         return [pdo for pdo in self.node.pdos if pdo.enabled and pdo.mapping]
 
     def carriers(self, direction: Direction, index: int, subindex: int = 0) -> list[PdoConfig]:
-        """Return the PDOs in use that carry an object."""
+        """Return the enabled PDOs of a direction that carry an object."""
         return [
             pdo
             for pdo in self.pdos()
@@ -109,20 +109,20 @@ class Subject:
         ]
 
     def inhibit_time(self, pdo: PdoConfig) -> float:
-        """Return the inhibit time of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
+        """Return the inhibit time of a TPDO in [s] from bus.yml, else the EDS; 0 for none."""
         if pdo.inhibit_time is not None:
             return pdo.inhibit_time
         return (self.value(pdo.communication, 3) or 0) / HUNDRED_MICROSECONDS
 
     def event_time(self, pdo: PdoConfig) -> float:
-        """Return the event timer of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
+        """Return the event timer of a TPDO in [s] from bus.yml, else the EDS; 0 for none."""
         if pdo.event_time is not None:
             return pdo.event_time
         return (self.value(pdo.communication, 5) or 0) / MILLISECONDS
 
 
 def object_name(index: int) -> str:
-    """Name an object of the standards, for messages: ``0x607A (target position)``."""
+    """Return index and name of a standard object, such as ``0x607A (target position)``."""
     name = Index(axis_of(index)[0]).name.lower().replace('_', ' ')
     return f'{object_address(index)} ({name})'
 
@@ -130,11 +130,11 @@ def object_name(index: int) -> str:
 RESTLESS = frozenset({Index.POSITION_ACTUAL, Index.VELOCITY_ACTUAL, Index.TORQUE_ACTUAL})
 """Objects that change all the time, also at rest."""
 REMOTE_TYPES = (252, 253)
-LATE_FACTOR = 1.5  # periods that a frame may come late before its deadline strikes
+LATE_FACTOR = 1.5  # shortest deadline of an RPDO, in periods of its frames
 
 
 def check_pdos(subject: Subject) -> None:
-    """Check every PDO in use."""
+    """Check every enabled PDO."""
     for pdo in subject.pdos():
         if pdo.direction is TPDO and subject.node.is_drive:
             _check_loss(subject, pdo)
@@ -233,7 +233,7 @@ PERIOD_EXPONENTS = (-3, -4, -5, -6)
 
 
 def check_drive(subject: Subject) -> None:
-    """Check a device that is driven by the CiA 402 driver."""
+    """Check a device that uses the CiA 402 driver."""
     if not subject.node.is_drive:
         return
     for axis in subject.node.axes:
@@ -247,7 +247,7 @@ def check_drive(subject: Subject) -> None:
 
 
 def period_setting(period: float) -> tuple[int, int] | None:
-    """Return value and exponent of 0x60C2 for a period in [s]; None where it cannot hold it."""
+    """Return value and exponent of 0x60C2 for a period in [s]; None if it does not fit."""
     for exponent in PERIOD_EXPONENTS:
         units = period * 10**-exponent
         if 1 <= round(units) <= 0xFF and abs(units - round(units)) < 1e-6 * units:
@@ -256,7 +256,7 @@ def period_setting(period: float) -> tuple[int, int] | None:
 
 
 def _check_interpolation_period(subject: Subject, offset: int) -> None:
-    """The time over which a drive interpolates is the time between two set-points."""
+    """Check that the interpolation period (0x60C2) equals the period of the set-points."""
     index = Index.INTERPOLATION_PERIOD + offset
     wanted = subject.bus.master.sync_period
     value, exponent = subject.value(index, 1), subject.value(index, 2)
@@ -289,7 +289,7 @@ def _check_interpolation_period(subject: Subject, offset: int) -> None:
 
 
 def _check_one_frame(subject: Subject, offset: int) -> None:
-    """A command and its target shall not be torn apart by a lost or late frame."""
+    """Check that one frame carries a command and its target, so that losses affect both."""
     controls = subject.carriers(RPDO, Index.CONTROLWORD + offset)
     modes = {used.mode for used in subject.used_modes()} or set(TARGET_OBJECTS)
     for index, subindex in dict.fromkeys(
@@ -336,7 +336,7 @@ def _check_support(subject: Subject, used: UsedMode) -> None:
 
 
 def _check_cyclic(subject: Subject, used: UsedMode) -> None:
-    """A mode with a target in every cycle needs SYNC, and feedback in every cycle."""
+    """Check that a cyclic mode has SYNC, and a target and feedback in every cycle."""
     if not subject.bus.master.sync_period:
         subject.findings.warning(
             subject.place(used.key),
@@ -348,7 +348,7 @@ def _check_cyclic(subject: Subject, used: UsedMode) -> None:
     _check_target_time(subject, used)
     for index in (Index.STATUSWORD, Index.POSITION_ACTUAL):
         carriers = subject.carriers(TPDO, used.at(index))
-        if not carriers and index is not Index.STATUSWORD:  # of which reading warns for any mode
+        if not carriers and index is not Index.STATUSWORD:  # reading already warns in any mode
             subject.findings.warning(
                 subject.place(used.key),
                 f'no enabled TPDO carries {object_name(used.at(index))}; it is read by SDO, too '
@@ -379,7 +379,7 @@ def _check_target_time(subject: Subject, used: UsedMode) -> None:
 
 
 def check_io_device(subject: Subject) -> None:
-    """Check a device by its profile in 0x1000."""
+    """Check a device against its device profile (0x1000)."""
     profile = 0 if subject.node.is_drive else profile_number(subject.node.dictionary)
     if profile == DeviceProfile.GENERIC_IO:
         _check_module(subject)
@@ -418,7 +418,7 @@ def _check_module(subject: Subject) -> None:
 
 
 def _check_input_events(subject: Subject) -> None:
-    """Warn about analogue inputs that are sent on change, which CiA 401 has disabled."""
+    """Warn of analogue inputs sent on change: CiA 401 disables that by default (0x6423)."""
     if subject.node.dictionary.get(ANALOG_EVENTS) is None or subject.value(ANALOG_EVENTS):
         return
     for pdo in subject.pdos():

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The typed model of one axis of a drive, and the units that the drive itself has.
+"""The typed model of one axis of a drive, and the units that the drive itself defines.
 
 0x60A8, 0x60A9 and 0x60AA name units (CiA 402-2), coded by CiA 303-2: bits 24 to 31 are a power of
 ten, 16 to 23 the unit of the position, 8 to 15 that of the time. The factor group (CiA 402-2,
-clause 8) says what these are in radians.
+clause 8) relates these to revolutions of the shaft.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class NamedUnit:
     """A unit of a position, velocity or acceleration."""
 
     size: float  # in [rad], [m] or [inc], or per second or second squared
-    text: str  # in words
-    slides: bool = False  # it is one of a joint that slides
-    # it is made of increments: the size is one of these, whose length is not known
+    text: str  # name of the unit
+    slides: bool = False  # a unit of length, for a prismatic joint
+    # the unit counts increments, whose length is not known
     counts: bool = False
 
 
@@ -62,18 +62,18 @@ RATES = {0xC0: NamedUnit(2.0 * math.pi / 60.0, 'rpm')}
 """Units of a velocity that an acceleration has above its unit of time."""
 
 
-RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')  # what many drives count velocities in
+RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')  # velocity unit of many drives
 
 
 def position_unit(value: int | None) -> NamedUnit | None:
-    """Return what 0x60A8 says; None where it is not there, or says nothing about a joint."""
+    """Decode 0x60A8; None if it is missing or not a unit of a joint position."""
     if value is None or (value >> 8) & 0xFF:
         return None
     return _named(value, POSITIONS, 1.0, '')
 
 
 def velocity_unit(value: int | None) -> NamedUnit | None:
-    """Return what 0x60A9 says, also increments; None where it is not there, or says nothing."""
+    """Decode 0x60A9, increments included; None if it is missing or an unknown unit."""
     time = None if value is None else TIMES.get((value >> 8) & 0xFF)
     if value is None or time is None:
         return None
@@ -81,7 +81,7 @@ def velocity_unit(value: int | None) -> NamedUnit | None:
 
 
 def acceleration_unit(value: int | None) -> NamedUnit | None:
-    """Return what 0x60AA says, also increments; None where it is not there, or says nothing."""
+    """Decode 0x60AA, increments included; None if it is missing or an unknown unit."""
     if value is None:
         return None
     code = (value >> 8) & 0xFF
@@ -133,7 +133,7 @@ ACCELERATION_ADDRESSES: tuple[tuple[int, int], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class FactorGroup:
-    """Ratios and units of a drive, None where it has no such object."""
+    """Ratios and units of a drive; None for objects that it lacks."""
 
     resolution: float | None = None  # encoder increments per revolution of the motor (0x608F)
     gear: float | None = None  # revolutions of the motor per revolution of the shaft (0x6091)
@@ -141,13 +141,13 @@ class FactorGroup:
     velocity_factor: float | None = None  # velocity units per position unit per second (0x6096)
     # acceleration units per velocity unit per second (0x6097)
     acceleration_factor: float | None = None
-    position_unit: NamedUnit | None = None  # what 0x60A8 names
-    velocity_unit: NamedUnit | None = None  # what 0x60A9 names
-    acceleration_unit: NamedUnit | None = None  # what 0x60AA names
+    position_unit: NamedUnit | None = None  # unit in 0x60A8
+    velocity_unit: NamedUnit | None = None  # unit in 0x60A9
+    acceleration_unit: NamedUnit | None = None  # unit in 0x60AA
 
     @classmethod
     def read(cls, value: Callable[[int, int], int | None]) -> FactorGroup:
-        """Make one of what value returns for objects of the first axis, None for those missing."""
+        """Build it from ``value(index, subindex)``, which returns None for missing objects."""
         ratios = {
             name: _ratio(value(index, 1), value(index, 2))
             for name, index in FACTOR_OBJECTS.items()
@@ -161,7 +161,7 @@ class FactorGroup:
 
     @property
     def position_scale(self) -> float:
-        """Position units per rad, or per m by 0x60A8; 0 when the drive does not have it."""
+        """Position units per rad, or per m by 0x60A8; 0 if the drive does not define it."""
         # position = internal [inc] * feed / (resolution * gear); without a feed constant
         # the drive counts increments of its encoder
         per_turn = (self.resolution or 0.0) * (self.gear or 1.0)
@@ -172,7 +172,7 @@ class FactorGroup:
 
     @property
     def velocity_scale(self) -> float:
-        """Velocity units per rad/s; 0 when the drive does not have it."""
+        """Velocity units per rad/s; 0 if the drive does not define it."""
         scale, named = self.position_scale, self.velocity_unit
         if named is None or self.velocity_factor not in {None, UNSET} or not scale:
             return scale * (self.velocity_factor or 1.0)
@@ -180,7 +180,7 @@ class FactorGroup:
 
     @property
     def acceleration_ratio(self) -> float | None:
-        """Acceleration units per velocity unit per second; None when the drive does not say it."""
+        """Acceleration units per velocity unit per second; None if the drive lacks the factor."""
         velocity, acceleration = self.velocity_unit, self.acceleration_unit
         if (
             velocity is not None
@@ -193,7 +193,7 @@ class FactorGroup:
 
     @property
     def rate_units(self) -> tuple[float, float]:
-        """What 1 of its velocities and of its accelerations is in position units per s and s2."""
+        """One velocity unit in position units/s, one acceleration unit in position units/s2."""
         position = self.position_scale
         velocity = (
             position / self.velocity_scale if position else 1.0 / (self.velocity_factor or 1.0)
@@ -202,7 +202,7 @@ class FactorGroup:
 
     @property
     def acceleration_objects(self) -> tuple[Index, ...]:
-        """Objects that say :attr:`acceleration_ratio`."""
+        """Objects that define :attr:`acceleration_ratio`."""
         if self.acceleration_ratio is None:
             return ()
         named = self.acceleration_ratio != self.acceleration_factor
@@ -211,7 +211,7 @@ class FactorGroup:
 
     @property
     def position_objects(self) -> tuple[Index, ...]:
-        """Objects of those that it has which say what a position unit is."""
+        """Objects of the drive that define its position unit."""
         names = ('resolution', 'gear', 'feed')
         objects = tuple(FACTOR_OBJECTS[name] for name in names if getattr(self, name) is not None)
         return objects or ((Index.SI_UNIT_POSITION,) if self.position_unit is not None else ())
@@ -231,7 +231,7 @@ def _titles(modes: Iterable[OperationMode]) -> dict[int, str]:
 
 
 class RecoveryPolicy(Enum):
-    """What becomes of a drive that was enabled when its device was lost and booted again."""
+    """What to do with a drive that was enabled when its device was lost, after it boots again."""
 
     MANUAL = 'manual'
     """It stays disabled until a client calls ~/recover or ~/enable."""
@@ -243,7 +243,7 @@ class RecoveryPolicy(Enum):
 class DriveConfig:
     """Units and sequences of one axis of a CiA 402 drive; each key of bus.yml fills its field."""
 
-    # name of the axis: that of the device, of its channel for one with several axes
+    # name of the axis: that of the device, or of the channel if the device has several axes
     name: str = ''
     # number of the axis from 0; its objects lie 0x800 * channel above those of the first (CiA
     # 402-2, 7.2)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What 1.0 of a target means for each drive, and by which rule; and units that move nothing."""
+"""Meaning of a target of 1.0 for each drive, and warnings of units that move nothing."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ SECONDS_PER_MINUTE = 60.0
 MIN_RADIANS = 0.1
 """Turn of the shaft in [rad] for 1 rad or 1 m of the joint, below which the scale is doubted: it
 takes a gear that makes the joint faster than its motor."""
-SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
+SAME_SCALE = 1e-3  # relative difference up to which two scales count as equal
 
 
 class UnitRule(Enum):
-    """Where the scale of an axis comes from; the value is how a person reads it."""
+    """Source of the scale of an axis; the value is the text for the user."""
 
     BUS_YML = f'{POSITION_KEY} of bus.yml'
     UPSTREAM = f'default of ros2_canopen (no {POSITION_KEY})'
@@ -52,26 +52,26 @@ class UnitRule(Enum):
 
 @dataclass(frozen=True, slots=True)
 class AxisUnits:
-    """What 1.0 means for an axis."""
+    """Meaning of a target of 1.0 for an axis."""
 
     name: str
-    rule: UnitRule  # where its scale comes from
-    increments: float  # position increments of 1.0; 0 when it is unknown
+    rule: UnitRule  # source of the scale
+    increments: float  # position increments of 1.0; 0 if unknown
     velocity: float  # device velocity units of 1.0 per second
     acceleration: float  # device acceleration units of 1.0 per second squared
-    # who says that; empty where it is assumed that the drive counts velocity units per second
+    # source of ``acceleration``; empty if velocity units per second are assumed
     acceleration_by: str
-    # angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it does not
-    # have it
+    # shaft angle for a target of 1.0 in [rad], by the factor group of the EDS; None if the EDS
+    # lacks it
     radians: float | None
-    factors: tuple[Index, ...] = ()  # objects of the factor group that say it
-    # speeds and accelerations that the drive has after boot, by object, in user units per second
+    factors: tuple[Index, ...] = ()  # objects of the factor group that define ``radians``
+    # speeds and accelerations of the drive after boot, by object, in user units per second
     # and second squared
     motion: Mapping[Index, float] = field(default_factory=dict)
 
 
 def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
-    """Return what 1.0 means for an axis of a drive."""
+    """Return the meaning of a target of 1.0 for an axis of a drive."""
     factors = _factor_group(subject, axis)
     rule, increments, velocity = UnitRule.BUS_YML, axis.scale_pos_to_dev, axis.scale_vel_to_dev
     if axis.scale_from_factor_group:
@@ -108,7 +108,7 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
 def reported_increments(
     bus: BusConfig, node: NodeConfig, axis: DriveConfig, position: float
 ) -> int:
-    """Return what an axis reports in 0x6064 at a position in user units, in [inc].
+    """Return the value of 0x6064 in [inc] for a position in user units.
 
     Raises:
         ValueError: It is not a number, or does not fit 0x6064 (INTEGER32).
@@ -126,10 +126,10 @@ def reported_increments(
 
 
 def rate_units(bus: BusConfig, node: NodeConfig, axis: DriveConfig) -> tuple[float, float]:
-    """Return what 1 of the velocities and of the accelerations of an axis is in [inc/s], [inc/s2].
+    """Return one velocity unit of an axis in [inc/s], and one acceleration unit in [inc/s2].
 
-    By the ratio of its scales; where bus.yml does not give them, by the EDS (0x6096, 0x6097,
-    0x60A9, 0x60AA), and 1 where neither says it, as most drives count increments.
+    They follow from the ratio of its scales in bus.yml, else from the EDS (0x6096, 0x6097, 0x60A9,
+    0x60AA). They are 1 if neither defines them, as most drives count increments.
     """
     subject = Subject(bus, node, Findings())
     units = axis_units(subject, axis)
@@ -148,7 +148,7 @@ def _plain(unit: float) -> float:
 
 
 def check_units(subject: Subject) -> None:
-    """Warn of units by which targets move nothing, or another distance than was meant."""
+    """Warn of units with which targets move nothing, or another distance than intended."""
     for axis in subject.node.axes if subject.node.is_drive else ():
         units = axis_units(subject, axis)
         if units.rule is UnitRule.FACTOR_GROUP and not units.increments:
@@ -185,13 +185,13 @@ def _check_coarse(subject: Subject, units: AxisUnits) -> None:
 
 
 def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
-    """Warn when only positions have a scale; where none has, the two fit each other."""
+    """Warn if positions have a scale and velocities none; without either, both match."""
     position, velocity = axis.scale_pos_to_dev, axis.scale_vel_to_dev
     default = DriveConfig().scale_vel_to_dev
     if units.rule is not UnitRule.BUS_YML or velocity != default or position == default:
         return
     if is_coarse(position) or is_requested(subject.bus, subject.node, VELOCITY_KEY):
-        return  # what is coarse is wrong itself
+        return  # a coarse scale has a warning of its own
     in_rpm = math.copysign(SECONDS_PER_MINUTE / REVOLUTION, position)
     subject.findings.warning(
         subject.place(POSITION_KEY),
@@ -206,7 +206,7 @@ def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnit
 def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
     """Warn when neither bus.yml nor the EDS gives the unit of accelerations."""
     if units.acceleration_by or units.rule is UnitRule.UPSTREAM:
-        return  # the default of ros2_canopen assumes all of them
+        return  # the defaults of ros2_canopen assume all units
     given = is_requested(subject.bus, subject.node, VELOCITY_KEY)
     subject.findings.warning(
         subject.place(VELOCITY_KEY if given else POSITION_KEY),
@@ -220,7 +220,7 @@ def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
 
 
 def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
-    """Warn when a target at the position that is shown would move the axis."""
+    """Warn if a target equal to the displayed position would move the axis."""
     if not units.increments:
         return
     to_dev, from_dev = axis.offset_pos_to_dev, axis.offset_pos_from_dev
@@ -239,12 +239,12 @@ def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> Non
 
 
 def is_coarse(scale: float) -> bool:
-    """Whether whole increments miss positions by more than the tolerance."""
+    """Return whether rounding to whole increments exceeds the position tolerance."""
     return 0.5 / abs(scale) > POSITION_TOLERANCE
 
 
 def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
-    """Warn when the default of ros2_canopen is not the drive's increments per radian."""
+    """Warn if the position scale contradicts the factor group of the EDS."""
     if units.rule is UnitRule.UPSTREAM and units.radians is not None:
         if math.isclose(units.radians, 1.0, rel_tol=SAME_SCALE):
             return
@@ -267,9 +267,9 @@ def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
 
 
 def _is_far_off(units: AxisUnits) -> bool:
-    """Whether a joint would turn so much faster than its motor that a scale must be wrong."""
+    """Return whether 1.0 is so small an angle by the EDS that a scale must be wrong."""
     if units.radians is None or is_coarse(units.increments):
-        return False  # what is coarse is reported itself
+        return False  # a coarse scale has a warning of its own
     return abs(units.radians) < MIN_RADIANS
 
 

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading what stands in the files: bus.yml with the place of each value, and EDS or DCF."""
+"""Parsing of bus.yml, keeping the place of each value, and of EDS and DCF files."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a bus: bus.yml, whose values know their line and key path, and EDS files.
+"""Reading of the files of a bus: bus.yml, with line and key path of each value, and EDS files.
 
 PyYAML composes the nodes; nothing is constructed from tags, so a file cannot run code. Anchors,
 aliases and merge keys (``<<``) work; a value that is used in several places keeps the place at
@@ -25,13 +25,13 @@ TAG_PREFIX = 'tag:yaml.org,2002:'
 MERGE_TAG = TAG_PREFIX + 'merge'
 INTEGER_TAG = TAG_PREFIX + 'int'
 TEXT_TAGS = (TAG_PREFIX + 'timestamp', TAG_PREFIX + 'value', MERGE_TAG)  # dates, '=' and '<<'
-SLIPPED_TAG = 'slipped'  # of a mapping that was put together by `reindent`
-NUMBERED = ('tpdo', 'rpdo')  # whose keys are numbers
+SLIPPED_TAG = 'slipped'  # tag of a mapping that `reindent` created
+NUMBERED = ('tpdo', 'rpdo')  # sections whose keys are numbers
 SIZE_MAX = 4 * 1024 * 1024  # [byte]
 
 
 class ScalarKind(Enum):
-    """What YAML 1.1 takes a scalar for."""
+    """Type of a scalar by the rules of YAML 1.1."""
 
     NULL = 'null'
     BOOLEAN = 'bool'
@@ -44,9 +44,9 @@ class ScalarKind(Enum):
 class Scalar:
     """A single value."""
 
-    place: Place  # where it is written
+    place: Place  # place in the file
     text: str  # its text, without quotes
-    kind: ScalarKind  # what YAML takes it for
+    kind: ScalarKind  # type by YAML 1.1
     quoted: bool = False  # it is written in quotes or as a block
 
 
@@ -60,14 +60,14 @@ class YamlList:
 
 @dataclass(frozen=True, slots=True)
 class YamlMap:
-    """A mapping, merge keys resolved."""
+    """A mapping with its merge keys resolved."""
 
     place: Place  # place of the key that it belongs to
-    # values by the text of their key; whole numbers as keys are written in decimal
+    # values by the text of their key; keys that are whole numbers are in decimal
     entries: dict[str, Item] = field(default_factory=dict)
 
     def place_of(self, key: str) -> Place:
-        """Return the place of a key, that of the mapping when the key is absent."""
+        """Return the place of a key, or of the mapping if the key is absent."""
         item = self.entries.get(key)
         return item.place if item is not None else self.place
 
@@ -76,7 +76,7 @@ Item: TypeAlias = Scalar | YamlList | YamlMap
 
 
 def read_document(file: Path, findings: Findings) -> YamlMap:
-    """Read a bus.yml, whose top level is a mapping; findings gets duplicate keys and the like.
+    """Read a bus.yml, whose top level is a mapping; add duplicate keys and the like to findings.
 
     Raises:
         ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
@@ -114,17 +114,17 @@ def _read_text(file: Path) -> str:
 
 
 class _Converter:
-    """Turns composed nodes into items, each node once however often it is used."""
+    """Converts composed YAML nodes to items; an aliased node is converted once."""
 
     def __init__(self, file: Path, findings: Findings) -> None:
         self._file = file
         self._findings = findings
         self._done: dict[int, Item] = {}
         self._open: set[int] = set()
-        self._kept: list[object] = []  # nodes of our own, so that no identity is given twice
+        self._kept: list[object] = []  # nodes created here; keeps their ids unique
 
     def convert(self, node: yaml.Node, place: Place) -> Item:
-        """Convert a node that is written at a place."""
+        """Convert a node to an item at a place."""
         identity = id(node)
         if identity in self._done:
             return self._done[identity]
@@ -193,7 +193,7 @@ class _Converter:
         own[name] = self.convert(value, where)
 
     def _merge(self, value: yaml.Node, place: Place, merged: dict[str, Item]) -> None:
-        """Merge the mappings of a merge key; of a list the earlier one counts."""
+        """Merge the mappings of a merge key; in a list the earlier one takes precedence."""
         sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
         for source in sources:
             where = self._place(source, f'{place.key}.<<')
@@ -214,9 +214,9 @@ class _Converter:
 def reindent(
     pairs: list[tuple[yaml.Node, yaml.Node]], report: Callable[[yaml.Node], None]
 ) -> list[tuple[yaml.Node, yaml.Node]]:
-    """Put keys below the number that they follow, where a listing has lost their indentation.
+    """Nest keys below the PDO number before them if their indentation was lost.
 
-    A number without a value that is followed by words can mean nothing else. Each is reported.
+    A number without a value followed by named keys can mean nothing else. Each one is reported.
     """
     result: list[tuple[yaml.Node, yaml.Node]] = []
     for key, value in pairs:
@@ -235,7 +235,7 @@ def reindent(
 
 
 def _key_text(key: yaml.ScalarNode) -> str:
-    """Return a key's text, so that ``on`` stays ``on``, and PDO numbers in decimal."""
+    """Return the text of a key: ``on`` stays ``on``, PDO numbers become decimal."""
     text = str(key.value)
     if key.tag == INTEGER_TAG:
         try:
@@ -250,16 +250,16 @@ PATH_VARIABLE = '@BUS_CONFIG_PATH@'
 
 
 class EdsFiles:
-    """The EDS files of a bus. Devices that share a file share what was read from it."""
+    """The EDS files of a bus; each file is read once and shared by its devices."""
 
     def __init__(self, folder: Path, beside: Path) -> None:
-        self.folder = folder  # what ``@BUS_CONFIG_PATH@`` stands for
-        # folder of the bus.yml, where a file is looked for that is not in ``dcf_path``
+        self.folder = folder  # replaces ``@BUS_CONFIG_PATH@``
+        # folder of the bus.yml, searched if a file is not in ``dcf_path``
         self.beside = beside
         self._read: dict[Path, Eds | None] = {}
 
     def find(self, dcf: str, dcf_path: str, item: Item, findings: Findings) -> Eds | None:
-        """Find and read a file by its name and folder in bus.yml, and report what is wrong."""
+        """Find and read a file by its name and folder in bus.yml; report its errors."""
         name, folder = (
             os.path.expandvars(text.replace(PATH_VARIABLE, str(self.folder)))
             for text in (dcf, dcf_path)
@@ -284,7 +284,7 @@ class EdsFiles:
         return None
 
     def default_drive(self, item: Item, findings: Findings) -> Eds | None:
-        """Return what any CiA 402 drive has, with a warning, for a drive without a file."""
+        """Return the generic EDS of a CiA 402 drive, for a drive without a file, and warn."""
         findings.warning(
             item.place,
             "no 'dcf': it is taken for a CiA 402 drive as the standard has it; which device "
@@ -318,5 +318,5 @@ def _remedy(tried: str, candidates: list[Path]) -> str:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except (OSError, ValueError):  # a name that is too long, or has a NUL in it
+    except (OSError, ValueError):  # a name that is too long or contains NUL
         return False

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading a section of bus.yml by its table of keys, with the traps of YAML 1.1 named.
+"""Reading a section of bus.yml by its table of keys, with the traps of YAML 1.1 handled.
 
-YAML 1.1 reads ``off`` as false, ``010`` as 8, ``1:30`` as 90 and ``1e-5`` as text. Where the
-meaning is beyond doubt the value is taken, elsewhere it is refused with what to write instead:
-readers of one value raise a RefusedError, those of a section add it to the findings.
+YAML 1.1 reads ``off`` as false, ``010`` as 8, ``1:30`` as 90 and ``1e-5`` as text. A value with a
+clear meaning is accepted; others are refused with a remedy. Readers of one value raise a
+RefusedError; readers of a section add it to the findings.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def describe(item: Item) -> str:
 
 
 def scalar(item: Item, wanted: str) -> Scalar:
-    """Return a value that is neither a list nor a mapping nor empty."""
+    """Return the item as a scalar; refuse a list, a mapping or an empty value."""
     if isinstance(item, Scalar) and item.kind is not ScalarKind.NULL:
         return item
     raise RefusedError(
@@ -55,16 +55,16 @@ def scalar(item: Item, wanted: str) -> Scalar:
 
 
 def key_number(name: str, high: int) -> int | None:
-    """Return a key that is a number of 0 to ``high``, None for any other."""
+    """Return a key as a number from 0 to ``high``, None for any other key."""
     if name.isascii() and name.isdecimal() and len(name) <= len(str(high)) and int(name) <= high:
         return int(name)
     return None
 
 
 def integer(item: Item) -> int:
-    """Read a whole number: decimal, ``0x`` hexadecimal or ``0b`` binary; quotes do not matter.
+    """Read a whole number: decimal, ``0x`` hexadecimal or ``0b`` binary, quoted or not.
 
-    One that people and YAML read differently (``010``) is refused.
+    Refuse ``010``, which YAML reads as octal.
     """
     value = scalar(item, 'a whole number')
     text = value.text.strip()
@@ -99,7 +99,7 @@ def _whole(text: str) -> int:
 
 
 def number(item: Item) -> float:
-    """Read a finite number; ``1e-5`` without a point counts, although it is text in YAML 1.1."""
+    """Read a finite number; accept ``1e-5``, which is text in YAML 1.1."""
     value = scalar(item, 'a number')
     try:
         result = float(_whole(value.text.strip()) if 'x' in value.text else value.text)
@@ -113,7 +113,7 @@ def number(item: Item) -> float:
 
 
 def boolean(item: Item) -> bool:
-    """Read true, yes, on, 1 or their opposites; not in quotes: loaders take "false" for true."""
+    """Read true, yes, on, 1 or their opposites; refuse quotes: loaders take "false" for true."""
     value = scalar(item, 'true or false')
     word = value.text.lower()
     if not value.quoted and word in TRUE_WORDS | FALSE_WORDS:
@@ -125,7 +125,7 @@ def boolean(item: Item) -> bool:
 
 
 def text(item: Item) -> str:
-    """Read a text; what YAML takes for something else needs quotes."""
+    """Read a text; refuse an unquoted value that YAML reads as another type."""
     value = scalar(item, 'a text')
     if value.kind is ScalarKind.TEXT or value.quoted:
         return value.text
@@ -135,7 +135,7 @@ def text(item: Item) -> str:
 
 
 def attempt(reader: Callable[[Item], T], item: Item, findings: Findings) -> T | None:
-    """Return what a reader makes of a value; None where it refuses, which the findings have."""
+    """Read a value; if the reader refuses it, add that to the findings and return None."""
     try:
         return reader(item)
     except RefusedError as reason:
@@ -152,9 +152,9 @@ CONVERTERS: dict[Kind | None, Callable[[Item], Any]] = {
 
 
 def read_section(mapping: YamlMap, keys: Sequence[Key], findings: Findings) -> dict[str, Any]:
-    """Check the keys of a section, and return the given values in units of the model by field.
+    """Check the keys of a section; return the values present by field, in units of the model.
 
-    Blocks (lists and mappings) are left to their own readers.
+    Blocks (lists and mappings) have their own readers.
     """
     check_keys(mapping, keys, findings)
     values: dict[str, Any] = {}
@@ -183,7 +183,7 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
 
 
 def convert(key: Key, item: Item) -> Any:  # noqa: ANN401  # the kind decides
-    """Return a value in units of the file, of the kind and in the range of its key."""
+    """Return a value in units of the file; refuse a wrong type or a value out of range."""
     value, why = CONVERTERS[key.kind](item), f'; {key.why}' if key.why else ''
     if key.form is not None and not key.form.fullmatch(value):
         raise RefusedError(f'{value!r} is no {key.text}', key.why)
@@ -208,7 +208,7 @@ def _in_range(key: Key, value: float | str) -> bool:
 
 
 def check_keys(mapping: YamlMap, keys: Iterable[Key], findings: Findings) -> None:
-    """Refuse keys that are not in a table, with a guess at what was meant."""
+    """Refuse unknown keys, with a suggestion for each."""
     names = [key.name for key in keys]
     for name, item in mapping.entries.items():
         if name not in names:
@@ -216,7 +216,7 @@ def check_keys(mapping: YamlMap, keys: Iterable[Key], findings: Findings) -> Non
 
 
 def remedy_for(name: str, names: Sequence[str]) -> str:
-    """Guess what an unknown key was meant to be, or where it belongs."""
+    """Suggest a similar key for an unknown one, or the section where it belongs."""
     if name in TOP_LEVEL:
         return f'{name!r} belongs to the top level; indent it less'
     for section, keys in SECTIONS.items():
@@ -231,13 +231,13 @@ def remedy_for(name: str, names: Sequence[str]) -> str:
 
 
 def block(mapping: YamlMap, name: str, findings: Findings) -> YamlMap | None:
-    """Return a section within a section, None when it is absent or of the wrong kind."""
+    """Return a mapping within a section, None if it is absent or not a mapping."""
     wanted = 'keys with values', f'indent the keys of {name!r} below it, or remove it'
     return _part(mapping, name, YamlMap, wanted, findings)
 
 
 def listing(mapping: YamlMap, name: str, findings: Findings) -> YamlList | None:
-    """Return a list within a section, None when it is absent or of the wrong kind."""
+    """Return a list within a section, None if it is absent or not a list."""
     remedy = "write entries as '- {index: 0x6040, sub_index: 0}' below it, or remove it"
     return _part(mapping, name, YamlList, ('a list', remedy), findings)
 

@@ -1,21 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a bus.yml and the EDS files that it names to the model of a bus, and its check.
+"""Building and checking the model of a bus from its bus.yml and EDS files.
 
-bus.yml has two formats, brought to one. New: ``options``, ``master``, ``defaults`` and ``nodes``.
-Old (dcfgen's own): ``options``, ``master``, and every other top-level key a device. A file with
-``nodes`` or ``defaults`` is of the new one. Top-level keys that begin with a dot are templates for
-anchors, ignored in both.
+bus.yml has two formats, converted to one. New: ``options``, ``master``, ``defaults`` and
+``nodes``. Old (dcfgen's own): ``options``, ``master``, and every other top-level key is a device.
+A file with ``nodes`` or ``defaults`` has the new format. Top-level keys that begin with a dot are
+templates for anchors and are ignored in both.
 
-A device's own values lie over ``defaults``, and always win:
+A device's own values override ``defaults``:
 
 - Mappings (``tpdo``, ``rpdo``, each PDO in them, ``remappings``, ``error_behavior``) merge key by
   key, so a device can change one PDO, or one key of it.
-- The list ``sdo`` merges object by object: the defaults' writes, without those of objects that the
-  device names itself, then the device's. An empty list drops the defaults'.
-- Every other list (``mapping``) is replaced, as its order and length mean something.
+- The list ``sdo`` merges object by object: first the writes of ``defaults`` to objects that the
+  device does not write itself, then those of the device. An empty list drops the defaults.
+- Every other list (``mapping``) is replaced, as its order and length matter.
 
-Last come the COB-IDs: free ones are given out, reserved and doubled ones refused.
+COB-IDs are assigned last; reserved and duplicate ones are refused.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from .master import build_master, read_master
 from .pdos import AUTO_ID
 
 PDO_SECTIONS = (RPDO.name, TPDO.name)
-DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
+DEPTH_MAX = 3  # levels of mappings: device, tpdo, number
 
 
 def load_bus(
@@ -48,13 +48,13 @@ def load_bus(
 ) -> BusConfig:
     """Read a bus.yml of either format and the EDS files that it names.
 
-    ``@BUS_CONFIG_PATH@`` stands for bus_config_path, or for the folder of the file.
+    ``@BUS_CONFIG_PATH@`` is replaced by bus_config_path, by default the folder of the file.
 
     Returns:
-        The bus; oddities are among its warnings.
+        The bus, with its warnings.
 
     Raises:
-        ConfigError: Something is wrong; the error lists every problem with file, line, key and
+        ConfigError: The files have errors; it lists every problem with file, line, key and
             remedy.
     """
     folder = None if bus_config_path is None else Path(bus_config_path)
@@ -65,9 +65,9 @@ def load_bus(
 
 
 def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
-    """Read a bus.yml and report everything that is wrong with it and its EDS files at once.
+    """Read a bus.yml and its EDS files; report all errors and warnings at once.
 
-    The bit rate in [bit/s] replaces that of bus.yml.
+    ``bitrate`` in [bit/s] overrides bus.yml.
     """
     findings = Findings()
     try:
@@ -78,7 +78,7 @@ def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Repo
 
 
 def resolve_bus(file: Path, bus_config_path: Path | None, findings: Findings) -> BusConfig:
-    """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
+    """Build a bus from its bus.yml and EDS files; omit what has errors, add those to findings."""
     option_section, master_section, devices = lay_out(read_document(file, findings), findings)
     options = Options(**read_section(option_section, OPTION_KEYS, findings))
     settings, config = read_master(master_section, findings)
@@ -101,7 +101,7 @@ def resolve_bus(file: Path, bus_config_path: Path | None, findings: Findings) ->
 
 
 def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Place]]:
-    """Yield where each key stands, by the names that lead to it."""
+    """Yield key path and place of each key."""
     yield names, item.place
     if not isinstance(item, YamlMap) or len(names) > DEPTH_MAX:
         return
@@ -116,7 +116,7 @@ def _check_lifecycle(
     sections: Mapping[str, YamlMap],
     findings: Findings,
 ) -> None:
-    """Refuse a mixture of managed and plain nodes, which cannot be brought up in order."""
+    """Refuse a mix of lifecycle and plain nodes, which cannot be started in order."""
     for node in nodes:
         if node.is_lifecycle == master.is_lifecycle:
             continue
@@ -135,7 +135,7 @@ def _check_node_ids(
     sections: Mapping[str, YamlMap],
     findings: Findings,
 ) -> list[NodeConfig]:
-    """Refuse doubled node ids; returns the devices that have one of their own."""
+    """Refuse duplicate node ids; return the devices with a unique one."""
     owners: dict[int, tuple[str, Place]] = {}
     if master_id is not None:
         owners[master_id] = ('the master', sections['master'].place_of('node_id'))
@@ -157,7 +157,7 @@ def _check_node_ids(
 def _check_axis_names(
     nodes: Sequence[NodeConfig], sections: Mapping[str, YamlMap], findings: Findings
 ) -> None:
-    """Refuse an axis that has the name of another one: each is a joint of its own."""
+    """Refuse axes with the same name: each is a joint of its own."""
     owners: dict[str, str] = {}
     for node in nodes:
         for axis in node.axes:
@@ -176,7 +176,7 @@ NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_
 def lay_out(root: YamlMap, findings: Findings) -> tuple[YamlMap, YamlMap, dict[str, YamlMap]]:
     """Find the sections of either format: ``options``, ``master``, and the devices in order.
 
-    The first two are empty when absent; ``defaults`` lie below the own values of each device.
+    The first two are empty if absent; ``defaults`` are merged into each device.
     """
     root = _lifted(root, findings)
     new = 'nodes' in root.entries or 'defaults' in root.entries
@@ -191,7 +191,7 @@ def lay_out(root: YamlMap, findings: Findings) -> tuple[YamlMap, YamlMap, dict[s
 
 
 def _lifted(root: YamlMap, findings: Findings) -> YamlMap:
-    """Treat sections that are indented below ``options`` as top-level sections."""
+    """Move sections that are indented below ``options`` to the top level."""
     options = root.entries.get('options')
     if not isinstance(options, YamlMap):
         return root
@@ -233,7 +233,7 @@ def _new_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
 def _old_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
     sections: dict[str, Item] = {}
     for name, item in root.entries.items():
-        # a device has an EDS in this format, a section with a typing error has not
+        # in this format a device has an EDS, a misspelled section has none
         is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
         if name not in TOP_LEVEL and not is_device and _close_section(name):
             findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
@@ -265,7 +265,7 @@ def _devices(nodes: YamlMap, defaults: YamlMap, findings: Findings) -> dict[str,
 
 
 def _with_dcf(section: YamlMap, findings: Findings) -> YamlMap:
-    """Accept ``eds`` for ``dcf``, a common spelling; ros2_canopen knows the latter only."""
+    """Accept the common ``eds`` for ``dcf``; ros2_canopen accepts only the latter."""
     item = section.entries.get('eds')
     if item is None:
         return section
@@ -293,7 +293,7 @@ SDO_LIST = 'sdo'
 
 
 def merge_device(defaults: YamlMap, own: YamlMap) -> YamlMap:
-    """Return a device's section with the defaults below it; it keeps its own place."""
+    """Merge ``defaults`` into the section of a device; it keeps its own place."""
     merged = _merge_mappings(defaults, own)
     common, special = defaults.entries.get(SDO_LIST), own.entries.get(SDO_LIST)
     if isinstance(common, YamlList) and isinstance(special, YamlList) and special.items:
@@ -315,7 +315,7 @@ def _merge_mappings(below: YamlMap, above: YamlMap) -> YamlMap:
 
 
 def _address(item: Item) -> tuple[int, int] | None:
-    """Return which object an entry writes; None when that cannot be read (reported elsewhere)."""
+    """Return the object that an entry writes; None if it is invalid (reported elsewhere)."""
     if not isinstance(item, YamlMap) or 'index' not in item.entries:
         return None
     subindex = item.entries.get('sub_index')
@@ -345,11 +345,10 @@ RESERVED: tuple[tuple[range, str], ...] = (
 
 
 def assign_cob_ids(nodes: Sequence[NodeConfig], findings: Findings) -> tuple[NodeConfig, ...]:
-    """Give every PDO its final COB-ID, in the order of the file.
+    """Assign every PDO its final COB-ID, in the order of the file.
 
-    Reserved and doubled identifiers are reported. When only EDS defaults are concerned, these
-    are warnings; two RPDOs with one identifier, of which one frame would move two axes, are an
-    error.
+    Report reserved and duplicate COB-IDs. They are warnings if only EDS defaults are concerned;
+    two RPDOs with one COB-ID are an error, as one frame would move two axes.
     """
     used = {pdo.cob_id for node in nodes for pdo in node.pdos if pdo.enabled}
     free = iter([cob_id for cob_id in FREE_RANGE if cob_id not in used])
@@ -388,7 +387,7 @@ def _assigned(
 def _check(
     title: str, pdo: PdoConfig, owners: list[tuple[str, PdoConfig]], findings: Findings
 ) -> None:
-    """Report an identifier that is reserved, or has owners already."""
+    """Report a COB-ID that is reserved or already in use."""
     for purpose in (purpose for ids, purpose in RESERVED if pdo.cob_id in ids):
         message = f'COB-ID 0x{pdo.cob_id:03X} of {title} is not for PDOs ({purpose})'
         _report(findings, [pdo], message)

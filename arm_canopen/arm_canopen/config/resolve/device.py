@@ -56,17 +56,17 @@ from .pdos import PdoReader
 from .sdo_list import parameter_writes, read_writes
 
 CONFIG_KEYS = keys_of(NodeConfig)
-DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
+DRIVE_PROFILE = 'Cia402'  # part of the names of CiA 402 drivers
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
 """What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""
 
 
 class DeviceReader:
-    """Reads one device."""
+    """Builds the configuration of one device."""
 
     def __init__(self, name: str, section: YamlMap, findings: Findings) -> None:
-        """Read the keys of a section, whose defaults are merged, but for its PDOs and objects."""
+        """Read the keys of a section with merged defaults, except its PDOs and objects."""
         self.name = name
         self._section = section
         self._findings = findings
@@ -88,7 +88,7 @@ class DeviceReader:
         master: MasterConfig,
         master_settings: MasterSettings,
     ) -> NodeConfig | None:
-        """Return the device, with COB-IDs still to be given; None without EDS or node id."""
+        """Return the device, its COB-IDs not yet assigned; None without EDS or node id."""
         settings, section, findings = self.settings, self._section, self._findings
         eds = self._find_eds(options, eds_files)
         remappings = texts(section, 'remappings', findings)
@@ -158,10 +158,10 @@ class DeviceReader:
         return eds_files.find(settings.dcf, folder, item, self._findings)
 
     def _identity(self, dictionary: ObjectDictionary) -> Identity:
-        """Return what is checked at boot.
+        """Return the identity to check at boot.
 
-        Revision and serial number count only if bus.yml names them: EDS files rarely have those of
-        the firmware at hand, and the device would not boot although it fits.
+        Revision and serial number are checked only if bus.yml sets them: EDS files rarely have
+        those of the actual firmware, so a suitable device would not boot.
         """
         return Identity(
             device_type=dictionary.number(Index.DEVICE_TYPE) or 0,
@@ -172,7 +172,7 @@ class DeviceReader:
         )
 
     def _encoder_axis(self, node: NodeConfig) -> DriveConfig:
-        """Return the scales of an encoder: of bus.yml, else in rad by its units per revolution."""
+        """Return the scales of an encoder from bus.yml, else rad by its units per revolution."""
         axis, given = node.drive, self._section.entries
         units = node.value_after_boot(EncoderObject.UNITS_PER_REVOLUTION)
         if 'scale_pos_from_dev' not in given and units:
@@ -182,7 +182,7 @@ class DeviceReader:
         return axis
 
     def _heartbeat_producer(self, dictionary: ObjectDictionary) -> float:
-        """Return the period of the device's heartbeat in [s]."""
+        """Return the heartbeat period of the device in [s]."""
         entry, wanted = dictionary.get(Index.PRODUCER_HEARTBEAT), self.settings.heartbeat_producer
         given = (dictionary.number(Index.PRODUCER_HEARTBEAT) or 0) / MILLISECONDS
         if entry is None and wanted:
@@ -222,7 +222,7 @@ class DeviceReader:
         return wanted or 0.0
 
     def _heartbeat_consumer(self, dictionary: ObjectDictionary, master: MasterConfig) -> bool:
-        """Return whether the device watches the master; by default it does if it can."""
+        """Return whether the device watches the master; by default True if it can."""
         entry, wanted = (
             dictionary.get(Index.CONSUMER_HEARTBEAT, 1),
             self.settings.heartbeat_consumer,
@@ -265,7 +265,7 @@ class DeviceReader:
                 )
 
     def _check_profile(self, node: NodeConfig) -> None:
-        """Refuse the drive profile's driver for a device that is no drive."""
+        """Refuse the CiA 402 driver for a device that is not a drive."""
         place = self._section.place_of('driver')
         if not drive_axes(node.dictionary):
             names = ' and '.join(
@@ -299,7 +299,7 @@ class DeviceReader:
             )
 
     def _check_drive_pdos(self, node: NodeConfig) -> None:
-        """Report what a drive lacks in its PDOs, and refuse what has no sign for its direction."""
+        """Warn of objects missing in the PDOs of a drive; refuse signed ones mapped unsigned."""
         mapped = [(pdo, each) for pdo in node.pdos if pdo.enabled for each in pdo.mapping]
         for axis, (direction, first, verb) in product(node.axes, CYCLIC_OBJECTS):
             index = first + AXIS_OFFSET * axis.channel
@@ -325,9 +325,9 @@ class DeviceReader:
 
 
 def _placed(axes: Iterable[DriveConfig], dictionary: ObjectDictionary) -> tuple[DriveConfig, ...]:
-    """Return the axes with the objects of those that the device has, in their order.
+    """Assign the axes, in order, to the channels that the EDS has.
 
-    Most have the first one at 0x6040; some have none there, or leave one out.
+    Most devices have channel 0 at 0x6040; some start higher, or skip a channel.
     """
     axes, present = tuple(axes), drive_axes(dictionary)
     if len(present) < len(axes):
@@ -336,7 +336,7 @@ def _placed(axes: Iterable[DriveConfig], dictionary: ObjectDictionary) -> tuple[
 
 
 ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
-SCALE_TOLERANCE = 0.01  # by which the product of the scales of both directions may miss 1
+SCALE_TOLERANCE = 0.01  # largest deviation from 1 of the product of both scales
 INVERSES = (
     ('scale_eff_from_dev', 'scale_eff_to_dev'),
     ('scale_acc_from_dev', 'scale_acc_to_dev'),
@@ -345,7 +345,7 @@ INVERSES = (
 
 
 def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveConfig:
-    """Build the settings that count for all axes of a drive from its drive keys by field."""
+    """Build the settings common to all axes of a drive from the values of its keys by field."""
     if 'switching_state' in values:
         state = DriveState(values['switching_state'])
         if state is DriveState.FAULT:
@@ -362,7 +362,7 @@ def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> 
 
 
 def check_node_name(name: str, place: Place, findings: Findings) -> None:
-    """Refuse a name of a device or axis that no ROS node can have."""
+    """Refuse a device or axis name that is not a valid ROS node name."""
     if not ROS_NAME.fullmatch(name):
         findings.error(
             place,
@@ -375,7 +375,7 @@ def check_node_name(name: str, place: Place, findings: Findings) -> None:
 def read_axes(
     name: str, section: YamlMap, count: int, drive: DriveConfig, findings: Findings
 ) -> tuple[DriveConfig, ...]:
-    """Return one record for each axis; what counts for all of them is in drive."""
+    """Return the settings of each axis; ``drive`` has those common to all."""
     names = [name] if count == 1 else [f'{name}_{number}' for number in range(count)]
     given = listing(section, 'channel_names', findings)
     if given is not None:
@@ -415,7 +415,7 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
 def _with_scales(
     drive: DriveConfig, section: YamlMap, values: dict[str, Any], findings: Findings
 ) -> DriveConfig:
-    """Return an axis with the values of a section, be it of its device or of its channel."""
+    """Return an axis with the values of a section, of its device or its channel, applied."""
     scales = [key for key in SCALE_KEYS if key in section.entries]
     if scales and values.get('scale_from_factor_group'):
         findings.error(
@@ -423,7 +423,7 @@ def _with_scales(
             f'the units are given twice: by the factor group of the drive, and by {scales[0]}',
             'remove one of them',
         )
-    # of our own keys, what bus.yml gives in the other direction only
+    # keys not in ros2_canopen: derived if bus.yml sets the other direction only
     added = {key: 1.0 / values[given] for key, given in INVERSES if given in values}
     axis = replace(drive, **added | values)
     for what in ('pos', 'vel', 'acc', 'eff'):

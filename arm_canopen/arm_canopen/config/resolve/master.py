@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Building the master's configuration from its section of bus.yml; driver classes, too."""
+"""Building the master's configuration from its section of bus.yml; checking driver classes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ MASTER_DRIVERS, DEVICE_DRIVERS = (
 )
 
 CONFIG_KEYS = keys_of(MasterConfig)
-BEHAVIOUR = Key(None, '', (0, U8_MAX), kind=Kind.INTEGER)  # of one kind of error
-TIME_PERIOD = 1.0  # [s] when only that bit requests it
+BEHAVIOUR = Key(None, '', (0, U8_MAX), kind=Kind.INTEGER)  # reaction to one kind of error
+TIME_PERIOD = 1.0  # [s] if only bit 30 of the COB-ID requests TIME
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
 
 def read_master(section: YamlMap, findings: Findings) -> tuple[MasterSettings, MasterConfig]:
-    """Read the section ``master``; what other sections have a say in is left as it is."""
+    """Read the section ``master``; :func:`build_master` resolves what depends on others."""
     values = read_section(section, MASTER_KEYS, findings)
     own = {each.field: values.pop(each.field) for each in CONFIG_KEYS if each.field in values}
     settings = MasterSettings(**values)
@@ -47,8 +47,8 @@ def build_master(
     options: Options,
     findings: Findings,
 ) -> MasterConfig:
-    """Complete the master's configuration; without SYNC the devices give its cycle."""
-    time_period = settings.time_period  # bit 30 of its COB-ID requests TIME, too
+    """Complete the master's configuration, except for its cycle period without SYNC."""
+    time_period = settings.time_period  # bit 30 of its COB-ID also requests TIME
     if time_period is None:
         time_period = TIME_PERIOD if config.time_cob_id & TIME_PRODUCER else 0.0
     return replace(
@@ -79,7 +79,7 @@ def _heartbeat_timeout(
     options: Options,
     findings: Findings,
 ) -> float:
-    """Return how long devices wait for the heartbeat of the master in [s]."""
+    """Return the heartbeat consumer time for the master in [s]."""
     multiplier = settings.heartbeat_multiplier or options.heartbeat_multiplier
     timeout = config.heartbeat_producer * multiplier
     if timeout > HEARTBEAT_TIME_MAX:
@@ -93,7 +93,7 @@ def _heartbeat_timeout(
 
 
 def _error_behaviour(section: YamlMap, findings: Findings) -> dict[int, int]:
-    """Read 0x1029 of the master: what it does by kind of error (CiA 301, 7.5.2.28)."""
+    """Read 0x1029 of the master: its reaction by kind of error (CiA 301, 7.5.2.28)."""
     given = (
         (subindex, attempt(partial(convert, BEHAVIOUR), item, findings))
         for subindex, item in error_behaviours(section, findings)
@@ -102,7 +102,7 @@ def _error_behaviour(section: YamlMap, findings: Findings) -> dict[int, int]:
 
 
 def check_driver(section: YamlMap, name: str, findings: Findings, *, for_master: bool) -> None:
-    """Check the driver class of the master or of a device, empty for none."""
+    """Check the driver class of the master or of a device; an empty name is none."""
     names = MASTER_DRIVERS if for_master else DEVICE_DRIVERS
     place = section.place_of('driver')
     if 'driver' not in section.entries:

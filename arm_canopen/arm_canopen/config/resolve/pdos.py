@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The PDOs of a device with their mappings: those of its EDS, changed by bus.yml.
+"""The PDOs of a device with their mappings: EDS values, overridden by bus.yml.
 
-Mappings are those of CiA 301, 7.5.2.36 and 7.5.2.38.
+CiA 301, 7.5.2.36 and 7.5.2.38 define the mappings.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from ..sections import MAPPING_KEYS, RPDO_KEYS, TPDO_KEYS
 from .sdo_list import find_entry, read_object
 
 PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}  # the keys of one PDO
-AUTO, AUTO_ID = 'auto', -1  # a COB-ID from the free range, which is given when all are known
+AUTO, AUTO_ID = 'auto', -1  # a free COB-ID, assigned when all others are known
 TRANSMISSION_DEFAULT = 255
 EVENT_TYPES = (254, 255)
 SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
@@ -55,7 +55,7 @@ class PdoReader:
     def __init__(
         self, name: str, device: YamlMap, eds: Eds, node_id: int, *, findings: Findings
     ) -> None:
-        """Prepare for a device, whose EDS has node-relative defaults resolved."""
+        """Use an EDS whose node-relative defaults are resolved."""
         self._name = name
         self._device = device
         self._eds = eds
@@ -72,7 +72,7 @@ class PdoReader:
             if number in wanted:
                 pdo = self._configured(pdo, wanted[number])
             elif pdo.enabled:
-                # the warnings of this mapping matter, as the PDO is in use
+                # keep the warnings of this mapping, as the PDO is in use
                 eds_mapping(direction, number, self._eds, self._findings)
                 self._warn_of_assumption(pdo)
             pdos.append(pdo)
@@ -82,7 +82,7 @@ class PdoReader:
         return f'{pdo.title} of {self._name}'
 
     def _warn_of_assumption(self, pdo: PdoConfig) -> None:
-        """Report a COB-ID that the file has for another node id, which boot looks up."""
+        """Warn of a COB-ID that the file has for another node id; the boot checks it."""
         entry = self._eds.dictionary.get(pdo.communication, 1)
         if entry is not None and entry.literal is not None and pdo.mapping:
             self._findings.warning(
@@ -109,7 +109,7 @@ class PdoReader:
                 )
 
     def _default(self, direction: Direction, number: int) -> PdoConfig:
-        """Describe a PDO as its EDS does."""
+        """Return a PDO as its EDS defines it."""
         communication = direction.communication + number - 1
         mapping = direction.mapping + number - 1
         entry = self._eds.dictionary.get(communication, 1)
@@ -132,7 +132,7 @@ class PdoReader:
         )
 
     def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
-        """Return the times that a DCF gives a PDO; others are left to the device."""
+        """Return the times that a DCF sets for a PDO; the device keeps its other times."""
         found = {}
         for key in PDO_KEYS[direction.name]:
             subindex = SUBINDICES.get(key.field, 0)
@@ -142,7 +142,7 @@ class PdoReader:
         return found
 
     def _configured(self, pdo: PdoConfig, section: YamlMap) -> PdoConfig:
-        """Lay the values of bus.yml over a PDO of the EDS."""
+        """Override a PDO of the EDS with the values of bus.yml."""
         values = read_section(section, PDO_KEYS[pdo.direction.name], self._findings)
         self._check_parameters(pdo, section, values)
         fixed: dict[str, Any] = {'configured': True, 'place': section.place}
@@ -169,7 +169,7 @@ class PdoReader:
         return replace(pdo, mapping=mapping)
 
     def _check_parameters(self, pdo: PdoConfig, section: YamlMap, values: dict[str, Any]) -> None:
-        """Refuse what the device has no sub-index for, and transmission types without use."""
+        """Refuse parameters that the device lacks, and reserved or RTR transmission types."""
         for key in PDO_KEYS[pdo.direction.name]:
             address = pdo.communication, SUBINDICES.get(key.field, 0)
             if address[1] and key.field in values and address not in self._eds.dictionary:
@@ -214,7 +214,7 @@ class PdoReader:
 def _no_such_pdo(
     direction: Direction, name: str, number: int | None, numbers: list[int]
 ) -> RefusedError:
-    """Explain why a key below ``tpdo`` or ``rpdo`` is no PDO of the device."""
+    """Return an error explaining why a key below ``tpdo`` or ``rpdo`` is no PDO of the device."""
     if any(key.name == name for key in PDO_KEYS[direction.name]):
         return RefusedError(
             f'{name!r} is no PDO number', f"indent {name!r} below a PDO number, such as '1:'"
@@ -237,7 +237,7 @@ EDS_REMEDY = 'name its mapping in bus.yml, or correct the EDS'
 
 
 def mapping_slots(direction: Direction, number: int, dictionary: ObjectDictionary) -> int:
-    """Return how many objects the EDS lets a PDO map."""
+    """Return the largest number of objects that a PDO can map by its EDS."""
     return sum(
         1 for entry in dictionary.subindices(direction.mapping + number - 1) if entry.subindex
     )
@@ -252,9 +252,9 @@ def is_fixed(direction: Direction, number: int, dictionary: ObjectDictionary) ->
 def eds_mapping(
     direction: Direction, number: int, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
-    """Return the mapping that a PDO has by the EDS; empty when it cannot be understood.
+    """Return the mapping of a PDO in the EDS; empty if it is invalid.
 
-    Objects that the EDS does not have, or not of this length, are reported as warnings.
+    Warn of mapped objects that the EDS lacks or that have another length there.
     """
     entries = eds.dictionary.subindices(direction.mapping + number - 1)
     count = entries[0].default if entries and entries[0].subindex == 0 else 0
@@ -297,7 +297,7 @@ def _from_word(
         return MappedObject(index, subindex, entry.data_type)
     name = object_address(index, subindex)
     what = f'{name}, which is not there' if entry is None else f'{entry} with {bits} bits'
-    # an object of a drive whose sign the standard knows is not read without it
+    # objects that CiA 402 defines as signed are decoded as signed
     signed = is_signed(index, subindex) and is_drive(dictionary)
     data_type = (SIGNED_BY_BITS if signed else UNSIGNED_BY_BITS).get(bits)
     result = 'the PDO is ignored' if data_type is None else f'taken as {data_type.name}'
@@ -308,7 +308,7 @@ def _from_word(
 def read_mapping(
     pdo: PdoConfig, entries: YamlList, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
-    """Read the list ``mapping`` that bus.yml gives a PDO; report what cannot be mapped."""
+    """Read the list ``mapping`` of a PDO in bus.yml; report objects that cannot be mapped."""
     objects = (_mapped_object(pdo.direction, item, eds, findings) for item in entries.items)
     mapping = tuple(mapped for mapped in objects if mapped is not None)
     bits = sum(mapped.bits for mapped in mapping)
@@ -347,7 +347,7 @@ def _mapped_object(
 
 
 def _dummy(direction: Direction, index: int, eds: Eds) -> MappedObject:
-    """Map a gap: a data type in place of an object (CiA 301, 7.4.7.1)."""
+    """Return a dummy entry: a data type in place of an object (CiA 301, 7.4.7.1)."""
     name = DataType(index).name
     if direction is not RPDO:
         raise RefusedError(

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The objects that are written at boot: ``sdo``, ``error_behavior``, and the values of a DCF.
+"""The objects written at boot: ``sdo``, ``error_behavior``, and the values of a DCF.
 
-A DCF is an EDS with the values of one configured device, which a configuration manager downloads
-(CiA 302-3, 0x1F20): the ParameterValues that are not the defaults (CiA 306-1, 4.6.3). Those of
-PDOs become the PDOs of the bus model.
+A DCF is an EDS with the values of one configured device. A configuration manager downloads
+(CiA 302-3, 0x1F20) the ParameterValues that differ from the defaults (CiA 306-1, 4.6.3). Those of
+PDO parameters go into the PDOs of the bus model.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ OWN_KEYS: dict[tuple[int, int], str] = {
 def read_writes(
     device: YamlMap, dictionary: ObjectDictionary, findings: Findings
 ) -> tuple[SdoWrite, ...]:
-    """Return what a section (defaults merged) wants written at boot, in the order of writing."""
+    """Return the writes that a section (defaults merged) requests, in the order of writing."""
     writes = []
     for address, value, place, timeout in _wanted(device, findings):
         at = place
@@ -97,7 +97,7 @@ def _wanted(
 
 
 def error_behaviours(section: YamlMap, findings: Findings) -> Iterator[tuple[int, Item]]:
-    """Yield what ``error_behavior`` has for 0x1029, by sub-index (CiA 301, 7.5.2.28)."""
+    """Yield sub-index and value of 0x1029 from ``error_behavior`` (CiA 301, 7.5.2.28)."""
     given = block(section, 'error_behavior', findings)
     for name, item in given.entries.items() if given else ():
         subindex = key_number(name, U8_MAX)
@@ -108,7 +108,7 @@ def error_behaviours(section: YamlMap, findings: Findings) -> Iterator[tuple[int
 
 
 def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[str, Any] | None:
-    """Return the values of an entry of ``sdo`` or ``mapping`` by field; None where it is wrong."""
+    """Return the values of an entry of ``sdo`` or ``mapping`` by field; None if it is invalid."""
     example = '{index: 0x6081, sub_index: 0}'
     if not isinstance(item, YamlMap):
         findings.error(item.place, f'expected an object, got {describe(item)}', f'write {example}')
@@ -120,7 +120,7 @@ def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[s
 
 
 def _writable(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
-    """Return an object that may be written; a second writer would contradict the master."""
+    """Return an object that may be written; refuse read-only ones and those of the master."""
     if pdo := pdo_object(index):
         raise RefusedError(
             f'{object_address(index)} configures a PDO, and the master would not know of it',
@@ -139,7 +139,7 @@ def _writable(dictionary: ObjectDictionary, index: int, subindex: int) -> Object
 
 
 def _check_emergency(entry: ObjectEntry, data: bytes) -> None:
-    """Refuse EMCYs under an identifier that has another meaning for every device."""
+    """Refuse the COB-ID of NMT, SYNC or TIME for EMCYs."""
     if entry.index == Index.EMCY_COB_ID and not int.from_bytes(data, 'little') & COB_ID_INVALID:
         cob_id = int.from_bytes(data, 'little') & CAN_ID_MASK
         if cob_id in (CobId.NMT, CobId.SYNC, CobId.TIME):
@@ -150,7 +150,7 @@ def _check_emergency(entry: ObjectEntry, data: bytes) -> None:
 
 
 def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
-    """Return an object of a device; the remedy names the sub-indices that it has instead."""
+    """Return an object of a device; the error for a missing one lists the existing sub-indices."""
     entry = dictionary.get(index, subindex)
     if entry is not None:
         return entry
@@ -163,7 +163,7 @@ def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> Objec
 
 
 def encode_value(entry: ObjectEntry, item: Item) -> bytes:
-    """Encode a value as an object holds it, within the limits of its type and the EDS."""
+    """Encode a value for an object; refuse values beyond the limits of its type and the EDS."""
     value = _value(entry.data_type, item)
     try:
         data = encode(entry.data_type, value)
@@ -214,7 +214,7 @@ PROGRAMS_AND_NMT = range(0x1F50, 0x1FA0)  # CiA 302-2 and -3
 
 
 def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
-    """Return the writes of a DCF in ascending order; an EDS has none, nor has what is reported."""
+    """Return the writes of a DCF in ascending order, except invalid ones; none for an EDS."""
     return tuple(
         SdoWrite(
             *entry.address, data, place=Place(eds.path, key=f'ParameterValue of {eds.path.name}')
