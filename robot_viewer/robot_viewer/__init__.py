@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a viewer needs of a robot: /tf from its description and its joint positions.
+"""Compute /tf from a robot description and joint positions, for viewers.
 
-:class:`StatePublisher` computes which transforms follow from a JointState, as ROS'
-robot_state_publisher does. It knows no ROS; the nodes are in :mod:`.nodes`. Descriptions are read
-by urdf_reader.
+:class:`StatePublisher` computes the transforms for a JointState, as ROS'
+robot_state_publisher does. It needs no ROS; the nodes are in :mod:`.nodes`. urdf_reader parses
+the descriptions.
 """
 
 from .state_publisher import (

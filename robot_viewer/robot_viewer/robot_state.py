@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""May the robot be moved? One word, one sentence and one action, from what was last seen of it."""
+"""May the robot be moved? One word, one sentence and one action, from its latest messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-SILENCE = 1.0  # without joint states after which the robot counts as out of reach in [s]
+SILENCE = 1.0  # time in [s] without joint states after which a robot is out of reach
 STALE = 3
 """Level of a status that is unknown, as in diagnostic_msgs."""
 DRIVE, LEGS, BUS = ': drive', ': state', ': bus'
-"""Ends of the names of the statuses of a drive, of the controller of a walking robot, of a bus."""
+"""Suffixes of status names: of a drive, of a walking robot's controller, of a bus."""
 FAULTY = frozenset({'Fault', 'Fault reaction active'})
 ENABLED = 'Operation enabled'
 BOOTING = (
@@ -24,13 +24,13 @@ BOOTING = (
     'waiting for mandatory devices',
     'starting',
 )
-"""Boot phases of a device that comes."""
+"""Boot phases of a device that is starting."""
 NO_MODE = 'No mode'
 MODE_SERVICES: Mapping[str, str] = {
     'Cyclic position': 'cyclic_position_mode',
     'Interpolated position': 'interpolated_position_mode',
 }
-"""By the mode of a drive; others get that of cyclic positions."""
+"""Services by drive mode; other modes use that of cyclic position."""
 POSTURES: Mapping[str, str] = {'stand': 'STANDING', 'lie': 'LYING', 'relax': 'RELAXED'}
 FOLLOWS = frozenset({'walk', 'turn', 'policy'})
 """Modes of a walking robot in which it follows velocities."""
@@ -49,12 +49,12 @@ class Level(Enum):
 
     @property
     def diagnostic(self) -> int:
-        """Level of a diagnostic_msgs/DiagnosticStatus."""
+        """The corresponding level of a diagnostic_msgs/DiagnosticStatus."""
         return {Level.WELL: 0, Level.FAULT: 2, Level.UNKNOWN: STALE}.get(self, 1)
 
     @property
     def exit_code(self) -> int:
-        """0: it may be moved; 1: after an action; 2: a fault; 3: out of reach, or no robot."""
+        """0: may be moved; 1: only after an action; 2: fault; 3: out of reach, or no robot."""
         return {Level.ACT: 1, Level.FAULT: 2, Level.UNKNOWN: 3}.get(self, 0)
 
 
@@ -62,46 +62,46 @@ class Level(Enum):
 class Status:
     """A diagnostic_msgs/DiagnosticStatus."""
 
-    name: str  # what it is about
+    name: str  # its subject
     level: int  # 0 good, 1 warning, 2 error, 3 stale
-    message: str  # in words
-    values: Mapping[str, str] = field(default_factory=dict)  # what was measured, by name
+    message: str  # human-readable text
+    values: Mapping[str, str] = field(default_factory=dict)  # details by key
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A STOP of the page after which nothing was allowed yet."""
+    """A STOP of the page that is still active."""
 
-    text: str = ''  # the robot's answer; empty before it came
-    stands: bool | None = None  # the robot has confirmed that it stands; None before its answer
+    text: str = ''  # the robot's answer; empty before it arrives
+    stands: bool | None = None  # whether the robot confirmed standstill; None before its answer
 
 
 @dataclass(slots=True)
 class Seen:
-    """What is known of a robot now."""
+    """Snapshot of what is known of a robot."""
 
     robot: str = ''  # its name; empty for none
     silence: float = 0.0  # time in [s] since its last message
-    statuses: Sequence[Status] = ()  # its diagnostics that are not old
-    services: frozenset[str] = frozenset()  # full names of the Trigger services that may be called
-    stop: Stop | None = None  # the STOP that counts
-    moving: bool = False  # its joints move; of a walking robot, it follows a velocity
-    mover: str = ''  # what moves it, in words; empty where that is unknown
-    limit: str = ''  # what limits its motion, in the words of the servo
-    acting: str = ''  # what was requested by the action and goes on, in words
-    battery: str = ''  # in words
+    statuses: Sequence[Status] = ()  # its diagnostics; overdue ones are stale
+    services: frozenset[str] = frozenset()  # full names of its Trigger services
+    stop: Stop | None = None  # the active STOP
+    moving: bool = False  # joints move; for a walking robot: it follows a velocity
+    mover: str = ''  # text on what moves it; empty if unknown
+    limit: str = ''  # servo text on what limits its motion
+    acting: str = ''  # label of the running action
+    battery: str = ''  # human-readable text
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """The answer."""
+    """Whether the robot may be moved, and why."""
 
-    word: str  # in capitals
+    word: str  # in capital letters
     level: Level  # what it means
     sentence: str  # the reason, and what to do
-    action: str = ''  # label of the one action that is wanted now; empty for none
+    action: str = ''  # label of the suggested action; empty for none
     calls: tuple[tuple[str, ...], ...] = ()
-    """Services of that action; each group is called when the one before has succeeded."""
+    """Services of that action; each group is called after the previous one succeeded."""
     faulty: tuple[str, ...] = ()  # drives that report a fault
 
     @property
@@ -110,12 +110,12 @@ class RobotState:
         return self.level in (Level.WELL, Level.WARNING)
 
     def __str__(self) -> str:
-        """Return it as one line."""
+        """Return the state as one line."""
         return f'{self.word}: {self.sentence}'
 
 
 def robot_state(seen: Seen) -> RobotState:
-    """Return the state of a robot; the worst that was seen counts."""
+    """Return the state of a robot, by the worst observation."""
     if not seen.robot:
         text = 'No robot is here yet. Start one; it is shown by itself.'
         return RobotState('NO ROBOT', Level.UNKNOWN, text)
@@ -282,13 +282,13 @@ def _boots(status: Status) -> bool:
 def _services(
     seen: Seen, names: Sequence[str] | Mapping[str, object], verb: str
 ) -> tuple[str, ...]:
-    """Return the full names of a service of nodes, of those that offer it."""
+    """Return the full names of a service on those of the nodes that offer it."""
     ends = tuple(f'/{name}/{verb}' for name in names)
     return tuple(sorted(service for service in seen.services if service.endswith(ends)))
 
 
 def _acting(seen: Seen, state: RobotState) -> RobotState:
-    """Return the state while its action goes on: it is not offered again."""
+    """Return the state, without offering its action again while that is running."""
     if not seen.acting:
         return state
     return replace(state, sentence=f'{seen.acting} ...', action='', calls=())

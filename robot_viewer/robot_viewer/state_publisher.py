@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From joint positions to transforms, with the behaviour of ROS' robot_state_publisher.
+"""Computes transforms from joint positions, with the behaviour of ROS' robot_state_publisher.
 
-No ROS and no clock in here: stamps and the time come in as integers in [ns].
+Independent of ROS and clocks: the caller passes stamps and the time as integers in [ns].
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from urdf_reader import (
     Transform,
 )
 
-HIGHEST_FREQUENCY = 1000.0  # greatest publish_frequency in [Hz] (robot_state_publisher 3.3.3)
+HIGHEST_FREQUENCY = 1000.0  # maximum publish_frequency in [Hz] (robot_state_publisher 3.3.3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +34,12 @@ class Settings:
     """
 
     publish_frequency: float = 20.0
-    """Greatest rate of a joint's transform, 0 to 1000 [Hz]; 0 for every message."""
-    frame_prefix: str = ''  # put in front of each frame name as it is
-    ignore_timestamp: bool = False  # publish at each message, whatever its stamp is
+    """Maximum rate of a joint's transform, 0 to 1000 [Hz]; 0 for every message."""
+    frame_prefix: str = ''  # prepended to each frame name unchanged
+    ignore_timestamp: bool = False  # publish at each message, whatever its stamp
 
     def __post_init__(self) -> None:
-        """Refuse a frequency that is none."""
+        """Reject a publish_frequency out of range."""
         if not 0.0 <= self.publish_frequency <= HIGHEST_FREQUENCY:
             raise ValueError(
                 f'publish_frequency is {self.publish_frequency:g} Hz; give 0 to'
@@ -48,7 +48,7 @@ class Settings:
 
     @property
     def interval(self) -> int:
-        """Least time between two transforms of a joint in [ns], in whole milliseconds."""
+        """Minimum time between two transforms of a joint in [ns], rounded down to milliseconds."""
         if not self.publish_frequency:
             return 0
         return int(1000.0 / self.publish_frequency) * 1_000_000
@@ -56,7 +56,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class FrameTransform:
-    """A transform with the names of its frames, which have the prefix."""
+    """A transform with its frame names, prefix included."""
 
     parent: str
     child: str
@@ -75,7 +75,7 @@ class MessageProblem(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """What follows from a message."""
+    """Result of processing a message."""
 
     stamp: int  # of the transforms in [ns]
     transforms: tuple[FrameTransform, ...] = ()  # to be published, possibly none
@@ -83,7 +83,7 @@ class Update:
 
 
 class StatePublisher:
-    """Computes which transforms are to be published when joint positions come in."""
+    """Computes the transforms to publish for each JointState."""
 
     def __init__(self, model: KinematicTree, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
@@ -106,16 +106,16 @@ class StatePublisher:
     def update(
         self, names: Sequence[str], positions: Sequence[float], stamp: int, now: int
     ) -> Update:
-        """Store a JointState, which may have joints of other robots; return what follows.
+        """Store a JointState, possibly with joints of other robots; return what to publish.
 
-        Positions are in [rad] or [m], its stamp and the ROS time ``now`` in [ns].
+        Positions are in [rad] or [m], the stamp and the ROS time ``now`` in [ns].
         """
         if len(names) != len(positions):
             return Update(
                 stamp, (), (MessageProblem.LENGTHS if positions else MessageProblem.NO_POSITION,)
             )
         problems = []
-        if now < self._last_now:  # a bag that begins again, or a simulation that was reset
+        if now < self._last_now:  # a bag restarted, or a simulation was reset
             self._published.clear()
             problems.append(MessageProblem.BACKWARDS)
         self._last_now = now

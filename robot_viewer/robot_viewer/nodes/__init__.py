@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS nodes of robot_viewer.
 
-Conventions: positions of joints are in [rad] or [m] by name, always the last ones, times on the
-steady clock in [s]; `order` runs something in the thread of the node.
+Conventions: joint positions are the latest ones, in [rad] or [m] by joint name; times are on the
+steady clock in [s]; `order` runs a function in the node's thread.
 """

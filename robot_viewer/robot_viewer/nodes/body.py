@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the body of a walking robot is and stands, and the pose that people give it, by topics."""
+"""Body state of a walking robot (attitude, feet, battery) and the pose that the user commands."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ from ..page.robot_scene import feet_of, FOOT, LEAST_FEET
 from ..page.style import NEUTRAL, value_of
 from .listening import Listening
 
-NOT_MEASURED = -1.0  # first number of a covariance where nothing is measured (REP 145)
+NOT_MEASURED = -1.0  # first covariance element of a quantity that is not measured (REP 145)
 CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
-CONTACTS_AGE = 1.0  # after which contacts of feet are not shown any more in [s]
+CONTACTS_AGE = 1.0  # age in [s] above which foot contacts are no longer shown
 LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
-"""Of the sliders to either side; the controller has limits of its own."""
+"""Slider ranges, symmetric about zero; the controller has its own limits."""
 LEVEL_LABEL = 'Level the body'
 DOWN_COLOR, UP_COLOR, LINE_COLOR = (35, 112, 50), (134, 142, 150), (24, 100, 171)
 MASS_COLOR, OUTSIDE_COLOR = (24, 100, 171), (255, 212, 59)
-"""Of the place below the centre of mass: over the support, or outside."""
-FOOT_RADIUS = 0.012  # of the mark of a foot in [m]
-MASS_RADIUS = 0.008  # of the mark below the centre of mass in [m]
+"""Colors of the projected centre of mass: inside the support polygon, and outside."""
+FOOT_RADIUS = 0.012  # of a foot marker in [m]
+MASS_RADIUS = 0.008  # of the marker of the projected centre of mass in [m]
 LINE_WIDTH = 3.0  # in [px]
 
 Pose: TypeAlias = tuple[float, float, float]
@@ -63,7 +63,7 @@ Pose: TypeAlias = tuple[float, float, float]
 
 
 class Body:
-    """Attitude, battery, feet and pose; in the thread of the node, but for :meth:`send`."""
+    """Attitude, battery, feet and pose. Call in the node's thread, except :meth:`send`."""
 
     def __init__(
         self, node: Node, page: RobotPage, listening: Listening, positions: Mapping[str, float]
@@ -74,7 +74,7 @@ class Body:
         self._feet: tuple[str, ...] = ()
         self.offered = False  # on the page
         self._attitude: Quaternion | None = None
-        self._mounted: dict[str, Quaternion] = {}  # how links are turned in the body at zero
+        self._mounted: dict[str, Quaternion] = {}  # link rotations in the root link at zero
         self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
         self._radius = 0.0
@@ -91,7 +91,7 @@ class Body:
         self._line: LineSegmentsHandle | None = None
 
     def describe(self, tree: KinematicTree) -> None:
-        """Use another robot."""
+        """Switch to another robot."""
         self._tree, self._feet = tree, feet_of(tree)
         self._mounted = {link: pose.rotation for link, pose in link_poses(tree, {}).items()}
         self._masses, self._radius = (), 0.0
@@ -141,7 +141,7 @@ class Body:
             self._offer_pose()
 
     def remove(self) -> None:
-        """Remove its marks from the view; the page removes its groups."""
+        """Remove the markers from the view; the page removes the groups."""
         for mark in self._marks:
             mark.remove()
         self._mass = self._line = None
@@ -149,7 +149,7 @@ class Body:
         self._seen, self.offered = True, False
 
     def _offer_pose(self) -> None:
-        """Offer the controls of the body."""
+        """Add the body controls to the page."""
         gui, live = self._page.server.gui, self._page.live
 
         def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
@@ -174,7 +174,7 @@ class Body:
             gui.add_button(LEVEL_LABEL, color=NEUTRAL).on_click(lambda _: level())
 
     def send(self, pose: Pose) -> None:
-        """Publish a pose of the body once, at once; the controller moves there slowly."""
+        """Publish a body pose once, immediately; the controller moves there slowly."""
         if self._poses is not None:
             roll, pitch, height = pose
             x, y, z, w = from_rpy(roll, pitch, 0.0)
@@ -182,7 +182,7 @@ class Body:
             self._poses.publish(PoseMessage(position=Point(z=height), orientation=turn))
 
     def draw(self) -> None:
-        """Show how the feet are now."""
+        """Update the foot contacts in the view."""
         if not self.offered or self._tree is None:
             return
         if time.monotonic() - self._contacts_at > CONTACTS_AGE:
@@ -205,7 +205,7 @@ class Body:
         self._show_support(found)
 
     def list(self) -> None:
-        """Show attitude and battery."""
+        """Update attitude and battery on the page."""
         if self.offered:
             html = horizon_html(self._attitude, self.battery)
             if self._contacts is not None and self._support is not None:
@@ -218,13 +218,13 @@ class Body:
         return [mark for mark in marks if mark is not None]
 
     def show_marks(self, seen: bool) -> None:
-        """Show or hide feet, support and centre of mass."""
+        """Show or hide foot markers, support polygon and centre of mass."""
         self._seen = seen
         for mark in self._marks:
             mark.visible = seen
 
     def _show_support(self, support: Support) -> None:
-        """Draw on the ground what the feet span, and the place below the centre of mass."""
+        """Draw the support polygon and the projected centre of mass on the ground."""
         corners = np.array(support.corners, float).reshape(-1, 3)
         ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
         below, centre = support.below, support.centre
@@ -280,18 +280,18 @@ SOURCES: Mapping[str, str] = {
     'measured_height': 'estimated by joints and attitude; nothing senses it',
     'physics': 'true: the simulation knows',
 }
-"""In words what quad_msgs/FootContacts has as source."""
+"""Texts for the `source` values of quad_msgs/FootContacts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """Which feet are on the ground, as it was published."""
+    """Feet on the ground, as published."""
 
     feet: frozenset[str]
-    source: str  # how that is known
+    source: str  # how the contacts were determined
 
     def html(self, found: Support) -> str:
-        """Return it in words."""
+        """Return the contacts and the stability margin as HTML."""
         names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
         source = SOURCES.get(self.source, self.source or 'the source is not stated')
         margin = found.margin
@@ -310,18 +310,18 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """What the feet on the ground span, in the root link in [m]."""
+    """Support polygon of the feet on the ground, in the root link frame in [m]."""
 
     corners: tuple[Vector, ...]
-    """On the ground below the feet, all round the robot; fewer than three span nothing."""
+    """Ground points below the feet, counterclockwise; fewer than three span no polygon."""
     centre: Vector | None  # of mass; None where the description has no masses
-    below: Vector | None  # the place on the ground below it
+    below: Vector | None  # its projection onto the ground
     margin: float | None
-    """How far that is inside of the corners; below zero outside, None without a span."""
+    """Distance of `below` from the polygon's edge; negative outside, None without a polygon."""
 
 
 def foot_radius(tree: KinematicTree, foot: str) -> float:
-    """Return the radius of a foot that is a ball in [m]; 0 for others."""
+    """Return the radius of a spherical foot in [m]; 0 for other shapes."""
     balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
     return next((ball.lengths('radius')[0] for ball in balls), 0.0)
 
@@ -333,9 +333,9 @@ def support(
     centre: Vector | None,
     radius: float = 0.0,
 ) -> Support:
-    """Return what the feet on the ground span, and where the centre of mass is over it.
+    """Compute the support polygon and the projection of the centre of mass onto it.
 
-    Places are in the root link, whose attitude is that in a level frame.
+    ``places`` are foot positions in the root link; ``attitude`` rotates it to a level frame.
     """
     x, y, z, w = attitude
     back = (-x, -y, -z, w)
@@ -357,7 +357,7 @@ def support(
 
 
 def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
-    """Return how far a place is inside of corners that go round counterclockwise [m]."""
+    """Return how far a point lies inside a counterclockwise polygon in [m]."""
     sides = zip(corners, (*corners[1:], corners[0]), strict=True)
     return min(
         ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / (math.hypot(bx - ax, by - ay) or 1.0)
@@ -366,18 +366,18 @@ def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
 
 
 def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
-    """Return roll and pitch in [rad], positive with the right side and the nose down."""
+    """Return roll (right side down positive) and pitch (nose down positive) in [rad]."""
     x, y, z, w = attitude
     sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
     return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)
 
 
 def horizon_html(attitude: Quaternion | None, battery: str) -> str:
-    """Return an artificial horizon with its numbers, and the battery, of what is measured."""
+    """Return HTML of an artificial horizon with its angles, and the battery, where measured."""
     parts = []
     if attitude is not None:
         roll, pitch = (math.degrees(angle) for angle in roll_pitch(attitude))
-        # one pixel is a degree; what is seen ahead rises when the nose goes down
+        # one pixel per degree; the horizon rises when the nose goes down
         parts.append(
             '<svg viewBox="-40 -40 80 80" width="110" height="110" style="border-radius:50%">'
             f'<g transform="rotate({-roll:.1f}) translate(0 {-pitch:.1f})">'
@@ -394,7 +394,7 @@ def horizon_html(attitude: Quaternion | None, battery: str) -> str:
 
 
 def battery_text(percentage: float, voltage: float) -> str:
-    """Return a charge of 0 to 1 and [V] in words; what is not measured is left out."""
+    """Format charge (0 to 1) and voltage in [V]; unmeasured values are left out."""
     parts = []
     if math.isfinite(percentage):
         parts.append(f'{100.0 * percentage:.0f} %')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectory controllers and grippers: what their joints do, and sending them to a target."""
+"""Trajectory controllers and grippers: monitor their joints and send them to targets."""
 
 from __future__ import annotations
 
@@ -28,41 +28,41 @@ from .listening import Listening
 STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
 STATE = '/controller_state'
 COMMAND = '/joint_trajectory'
-NEAR = 0.01  # how near to its target in [rad] or [m] a joint has reached it
-SETTLING_TIMEOUT = 1.0  # time in [s] after the end of a motion at which it is looked at
+NEAR = 0.01  # distance in [rad] or [m] within which a joint has reached its target
+SETTLING_TIMEOUT = 1.0  # time in [s] from the end of a motion to its check
 
 SILENCE = 1.2
-"""Time in [s] without a trajectory before an empty one says that what follows is a new request: a
-controller that was stopped in a stream wants a second."""
+"""Pause in [s] before an empty trajectory marks the next one as a new request: a controller that
+was stopped during a stream requires one second."""
 
 
 @dataclass(slots=True)
 class Controller:
-    """A controller that was found."""
+    """State of one trajectory controller."""
 
-    commands: Publisher  # where it takes trajectories
-    joints: tuple[str, ...] = ()  # its joints, once it has named them
-    positions: dict[str, float] = field(default_factory=dict)  # where they are in [rad] or [m]
-    references: dict[str, float] = field(default_factory=dict)  # where the controller holds them
+    commands: Publisher  # its trajectory topic
+    joints: tuple[str, ...] = ()  # empty until its first state message
+    positions: dict[str, float] = field(default_factory=dict)  # measured, in [rad] or [m]
+    references: dict[str, float] = field(default_factory=dict)  # set-points of the controller
     wanted: tuple[Mapping[str, float], float] | None = None
-    """Targets that were not sent yet, and the share of the greatest velocity."""
+    """Pending targets, and the speed as a fraction of maximum velocity."""
     targets: Mapping[str, float] = field(default_factory=dict)
-    """Where the joints are on their way to; empty when they are not."""
-    ends: float = -math.inf  # steady time at which they are there in [s]
+    """Targets of the current motion; empty without one."""
+    ends: float = -math.inf  # steady time in [s] at which the motion ends
     sent: float = -math.inf  # steady time of the last trajectory in [s]
     aimed: tuple[Mapping[str, float], float] | None = None
-    """Targets whose button is held, and their share of the greatest velocity."""
-    held_at: float = -math.inf  # steady time at which it was seen to be held in [s]
-    lets_go: bool = False  # the robot was stopped, or did not follow, and nothing was sent since
+    """Targets whose button is held, and their fraction of maximum velocity."""
+    held_at: float = -math.inf  # steady time in [s] of the button's last heartbeat
+    lets_go: bool = False  # stopped, or did not follow, and nothing sent since
 
     def end(self) -> None:
-        """Send an empty trajectory, which ends what went before."""
+        """Send an empty trajectory, which ends the current one."""
         kind: Any = self.commands.msg_type
         self.commands.publish(kind())
 
     @property
     def busy(self) -> bool:
-        """Whether its joints are on their way."""
+        """Whether its joints are moving to a target."""
         return bool(self.targets)
 
     @property
@@ -75,10 +75,10 @@ class Controller:
 
     @property
     def places(self) -> dict[str, float]:
-        """Where joints stay that are not sent anywhere, or go on to.
+        """Positions for joints without a new target, by name.
 
-        It is the reference, or each target elsewhere would move a joint on by its following error.
-        A joint that is far from it is not held there: it stays where it is.
+        These are current targets, else set-points: measured positions would shift a joint by its
+        following error. A joint far from its set-point keeps its measured position.
         """
         held = {
             name: self.references[name]
@@ -89,16 +89,16 @@ class Controller:
 
 
 class Controllers:
-    """Those of the robot of a node; everything in the thread of the node.
+    """Trajectory controllers of the node's robot. Call in the node's thread.
 
-    Commands are trajectories of one point, on the topic: a later one takes over from the one
-    before, and a controller whose drives are not enabled follows none.
+    Commands are one-point trajectories on the topic: each replaces the previous one. A
+    controller whose drives are disabled follows none.
     """
 
     def __init__(
         self, node: Node, listening: Listening, report: Report, ended: Callable[[], None]
     ) -> None:
-        """Find none yet; ``ended`` is called when all joints of a held button are done."""
+        """Start empty; ``ended`` is called when all joints of a held button have arrived."""
         self._node, self._listening, self._report = node, listening, report
         self._ended = ended
         self.found: dict[str, Controller] = {}
@@ -106,11 +106,11 @@ class Controllers:
 
     @property
     def busy(self) -> bool:
-        """Whether joints are on their way, or about to be."""
+        """Whether joints are moving, or have pending targets."""
         return any(each.busy or each.wanted for each in self.found.values())
 
     def look(self, description: str) -> None:
-        """Find the controllers that there are."""
+        """Discover the robot's controllers in the ROS graph."""
         topics = dict(self._node.get_topic_names_and_types())
         named = [
             name.removesuffix(STATE)
@@ -138,12 +138,12 @@ class Controllers:
         self.history.add(targets, positions, time.monotonic())
 
     def aim(self, targets: Mapping[str, float], share: float, at: float) -> None:
-        """Send joints to targets, and no other joint, as long as this is called again.
+        """Move only these joints to targets, as long as this is called repeatedly.
 
-        ``share`` is that of the greatest velocity, ``at`` when the button was seen to be held.
+        ``share`` is the fraction of maximum velocity, ``at`` the heartbeat's steady time [s].
         """
         if time.monotonic() - at > RELEASED_AFTER:
-            return  # this node was held up; the button may be let go
+            return  # this node was delayed; the button may be released
         for controller in self.found.values():
             own = {name: at for name, at in targets.items() if name in controller.joints}
             if own:
@@ -152,7 +152,7 @@ class Controllers:
                     controller.wanted = controller.aimed = (own, share)
 
     def let_go(self) -> None:
-        """Stop what is on its way to a target: its button was let go."""
+        """Stop motions to targets after their button was released."""
         for controller in self.found.values():
             if controller.busy and not controller.arrived:
                 controller.end()
@@ -160,13 +160,13 @@ class Controllers:
             controller.wanted = controller.aimed = None
 
     def stop(self) -> None:
-        """Send nothing that was not sent yet, and wait for nothing: the robot was stopped."""
+        """Drop all pending and current targets after the robot was stopped."""
         for controller in self.found.values():
             controller.wanted = controller.aimed = None
             controller.targets, controller.lets_go = {}, True
 
     def advance(self, velocities: Mapping[str, float]) -> None:
-        """Send what is wanted, and report what was reached."""
+        """Send pending targets, and report finished motions."""
         now = time.monotonic()
         if any(each.aimed and now - each.held_at > RELEASED_AFTER for each in self.found.values()):
             self.let_go()
@@ -192,7 +192,7 @@ class Controllers:
                 self._end_press()
 
     def _end_press(self) -> None:
-        if not self.busy:  # the joints of another controller go on
+        if not self.busy:  # unless joints of another controller are moving
             self._ended()
 
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
@@ -211,7 +211,7 @@ def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401
 
 
 SEND_GOAL = '/_action/send_goal'
-SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'  # of grippers of one joint
+SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'  # for grippers with one joint
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,27 +222,27 @@ class _Gripper:
 
 
 class Grippers:
-    """Those of the robot of a node; everything in the thread of the node."""
+    """Grippers of the node's robot. Call in the node's thread."""
 
     def __init__(self, node: Node, report: Report) -> None:
         self._node, self._report = node, report
         self._found: dict[str, _Gripper] = {}
         self._calls: dict[str, ActionCall] = {}
-        self._lost: list[ActionCall] = []  # the graph misses their servers; STOP cancels them, too
+        self._lost: list[ActionCall] = []  # servers left the graph; STOP cancels them, too
         self._ends: Mapping[str, tuple[float, float]] = {}
 
     @property
     def named(self) -> tuple[tuple[str, str], ...]:
-        """Full names of their controllers, each with its joint."""
+        """Pairs of full controller name and joint."""
         return tuple((name, each.joint) for name, each in self._found.items())
 
     @property
     def busy(self) -> bool:
-        """Whether one is opened or closed by the page."""
+        """Whether the page is moving a gripper."""
         return any(not call.ended for call in self._calls.values())
 
     def describe(self, tree: KinematicTree) -> None:
-        """Use another robot."""
+        """Switch to another robot."""
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}
         for name in [n for n, each in self._found.items() if each.joint not in self._ends]:
             if call := self._calls.pop(name, None):
@@ -252,7 +252,7 @@ class Grippers:
     def look(
         self, services: Mapping[str, Sequence[str]], controllers: Mapping[str, Controller]
     ) -> None:
-        """Find those of one joint; expect no result of a server that is gone."""
+        """Discover one-joint grippers; await no result from a server that is gone."""
         for name, gripper in self._found.items():
             call = self._calls.get(name)
             if gripper.service not in services and call is not None and not call.ended:
@@ -276,7 +276,7 @@ class Grippers:
                 self._found[name] = _Gripper(service, client, controller.joints[0])
 
     def grip(self, name: str, position: float) -> None:
-        """Move one to a position of its joint in [m] or [rad]."""
+        """Move a gripper to a joint position in [m] or [rad]."""
         gripper = self._found.get(name)
         ends = (0.0, 0.0) if gripper is None else self._ends[gripper.joint]
         words = {ends[0]: 'close', ends[1]: 'open'}
@@ -289,7 +289,7 @@ class Grippers:
         self._calls[name] = ActionCall(gripper.client, goal, partial(self._done, what))
 
     def stop(self) -> None:
-        """Cancel what is on its way."""
+        """Cancel all running goals."""
         for call in (*self._calls.values(), *self._lost):
             call.cancel()
         self._calls.clear()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first motion of a joint, for people at the page: services and topics of its drive."""
+"""First motion of a joint from the page, by the services and topics of its drive."""
 
 from __future__ import annotations
 
@@ -54,28 +54,28 @@ from ..robot_state import DRIVE, Status
 READ_UNITS = 'read_units'
 READ_UNITS_TYPE = 'arm_msgs/srv/ReadUnits'
 STATUS_TIMEOUT, SILENCE_TIMEOUT = 3.0, 10.0
-"""Times in [s] after the enabling, in which /diagnostics has to show it, and to say anything."""
+"""Times in [s] after enabling: for /diagnostics to show it, and to send anything at all."""
 ANSWER_TIMEOUT, DISABLE_TIMEOUT = 20.0, 5.0
-"""Times in [s] for the answer of a service: before the motion, and of the one that disables."""
+"""Service timeouts in [s]: before the motion, and for disabling."""
 SETTLE_TIME = 0.7
-"""Time in [s] after the last target, until the position is read: the robot's own time-out and its
-ramp are in it."""
-DISTANCE = 1.0  # in the unit of people, degrees or millimetres
+"""Time in [s] from the last target to reading the position: covers the robot's own time-out and
+its ramp."""
+DISTANCE = 1.0  # in display units, [deg] or [mm]
 SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
-"""In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
+"""Display units per second: slow enough to release in time even if the scale is off by ten."""
 HOLD = 'Hold to move'
 PRESS_ANEW = 'let go of the button, and press it anew'
 
 
 class _FailedError(Exception):
-    """Why no motion can be made, in words."""
+    """The motion cannot be made; the message is the reason."""
 
 
 class FirstMotion:
-    """One joint after another; everything in the thread of the node, and nothing waits.
+    """First motions, one joint at a time. Call in the node's thread; never blocks.
 
-    Targets go to ``~/target`` of the drive, as those of any client: one for each heartbeat of the
-    held button. When they end the drive halts by itself (``target_timeout_ms`` of bus.yml).
+    Targets go to ``~/target`` of the drive, as from any client: one per heartbeat of the held
+    button. When the targets end, the drive halts by itself (``target_timeout_ms`` of bus.yml).
     """
 
     def __init__(
@@ -91,27 +91,27 @@ class FirstMotion:
         self._kinds: Mapping[str, JointKind] = {}
         self._drives: Mapping[str, str] = {}
         self._offered = False
-        self._hold: int | None = None  # number of the button, while a motion is prepared
-        self._kind = JointKind.TURNS  # of the joint that is chosen
+        self._hold: int | None = None  # number of the button while a motion is ready
+        self._kind = JointKind.TURNS  # of the selected joint
         self._publishers: dict[str, Publisher] = {}
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
-        self._run: Iterator[None] | None = None  # what goes on at each look
-        self._disabling = False  # a drive that moved without a command
-        self._seen_at = -math.inf  # when a position of the joint came
+        self._run: Iterator[None] | None = None  # resumed by each advance()
+        self._disabling = False  # of a drive that moved without a command
+        self._seen_at = -math.inf  # when the last joint position was received
         self._targets: GuardedTargets | None = None
         self._commanded = 0.0
         self._reported: float | None = None
 
     @property
     def busy(self) -> bool:
-        """Whether positions matter, also for a page that was closed."""
+        """Whether positions are needed, even without an open page."""
         return self._run is not None
 
     # -- what the robot offers
 
     def describe(self, tree: KinematicTree) -> None:
-        """Another robot is shown."""
+        """Switch to another robot."""
         self._kinds = {
             joint.name: JointKind.SLIDES if joint.kind is UrdfKind.PRISMATIC else JointKind.TURNS
             for joint in tree.movable()
@@ -120,7 +120,7 @@ class FirstMotion:
         self._drives = {}
 
     def look(self, services: Mapping[str, Sequence[str]], drives: Collection[str]) -> None:
-        """Find the drives that say how they count."""
+        """Discover the drives that report their units."""
         found = {
             drive.rpartition('/')[2]: drive
             for drive in sorted(drives)
@@ -162,7 +162,7 @@ class FirstMotion:
         self._begin('')
 
     def remove(self) -> None:
-        """Remove it from the page, and command nothing any more."""
+        """Remove the panel from the page, and stop commanding."""
         self._end()
         self._drop_hold()
         self._folder.remove()
@@ -196,15 +196,15 @@ class FirstMotion:
     # -- what is shown
 
     def _begin(self, text: str, *, failed: bool = False, waits: bool = False) -> None:
-        """Show that nothing is prepared, and why, or what is waited for."""
-        # what becomes of a drive that has to be disabled is not hidden by anything else
+        """Show that no motion is ready, and why, or what the panel waits for."""
+        # nothing may hide the outcome of disabling a drive
         if self._offered and not self._disabling:
             self._prepare.disabled = waits
             self._state.content = line(text, BAD if failed else PLAIN) if text else ''
             self._show()
 
     def _show(self, *, moves: bool = False, asks: bool = False, concluded: bool = False) -> None:
-        self._drop_hold()  # what is pressed for a motion moves nothing in the next one
+        self._drop_hold()  # a press for one motion must not move the next one
         if moves:
             order = self._order
             self._hold, html = self._page.live.button(
@@ -228,7 +228,7 @@ class FirstMotion:
             self._hold, self._place_of_hold.content = None, ''
 
     def list(self) -> None:
-        """Show how far it is; called some times a second."""
+        """Show the progress of the motion; called a few times per second."""
         targets = self._targets
         if targets is None or targets.guard.detail:
             return
@@ -247,18 +247,18 @@ class FirstMotion:
     # -- before the motion
 
     def stop(self) -> None:
-        """Command nothing any more: the robot was stopped."""
-        if self.busy and not self._disabling:  # else what was measured is kept
+        """Stop commanding after the robot was stopped."""
+        if self.busy and not self._disabling:  # else keep the measurement
             self._end()
             self._begin('ended by a stop; prepare it anew')
 
     def _end(self) -> None:
-        """Forget what was prepared and measured."""
+        """Discard the prepared motion and its measurement."""
         self._run = self._targets = self._reported = None
         self._disabling = False
 
     def forget(self) -> None:
-        """Another joint was chosen: what was prepared counts no more."""
+        """Discard the prepared motion after another joint was selected."""
         if not self._disabling:
             self._end()
             self._begin('')
@@ -269,7 +269,7 @@ class FirstMotion:
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
 
     def prepare(self, request: MotionRequest) -> None:
-        """Enable the drive, and say what will happen."""
+        """Enable the drive, and announce the motion."""
         if request.joint not in self._drives or self._disabling:
             return
         self._end()
@@ -278,7 +278,7 @@ class FirstMotion:
         self.advance()
 
     def _motion(self, request: MotionRequest) -> Iterator[None]:
-        """Prepare and make a motion, one step at each look."""
+        """Prepare and execute a motion, one step per :meth:`advance`."""
         kind = self._kinds[request.joint]
         if large := too_far(kind, request.distance) or too_fast(kind, request.speed):
             raise _FailedError(large)
@@ -364,7 +364,7 @@ class FirstMotion:
         return problem_of(values, time.monotonic() - self._seen_at)
 
     def _await_status(self) -> Iterator[None]:
-        """Wait until /diagnostics shows a drive that takes targets: what is known of it is old."""
+        """Wait until new /diagnostics show that the drive accepts targets."""
         since, before = time.monotonic(), self._status()
         while True:
             silent = self._status() is before
@@ -378,22 +378,22 @@ class FirstMotion:
     # -- the motion
 
     def beat(self, at: float) -> None:
-        """Process a heartbeat of the held button that came at a steady time in [s]."""
+        """Process a heartbeat of the held button, received at steady time ``at`` in [s]."""
         if self._targets is not None:
             self._targets.beat(at)
 
     def release(self) -> None:
-        """The button was let go."""
+        """Process the release of the button."""
         if self._targets is not None:
             self._targets.release()
 
     def finish(self) -> None:
-        """It is enough: end the motion before its target."""
+        """End the motion before its target."""
         if self._targets is not None and self._targets.guard.finish() is Order.END:
             self._targets.release()
 
     def advance(self) -> None:
-        """Go on; called 30 times a second."""
+        """Run the next step; called at 30 Hz."""
         run = self._run
         if run is None:
             return
@@ -417,7 +417,7 @@ class FirstMotion:
                 yield
 
     def _disable(self, why: str) -> Iterator[None]:
-        """Disable a joint that moves without a command; nothing ends that before its answer."""
+        """Disable a drive that moved uncommanded; nothing interrupts this before the answer."""
         problem = f'{self._request.joint}: {why}'
         self._node.get_logger().warning(f'first motion of {problem}')
         self._targets = None
@@ -451,7 +451,7 @@ class FirstMotion:
         self._show(asks=True)
 
     def conclude(self, saw: Saw, distance: float) -> None:
-        """Conclude from what was seen, and how far about it was in [rad] or [m]."""
+        """Judge units and sign from what the user saw; rough ``distance`` in [rad] or [m]."""
         axis, reported = self._axis, self._reported
         if axis is None or reported is None:
             return

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer foxglove_bridge``: the topics of a robot for Foxglove and Lichtblick.
+"""``ros2 run robot_viewer foxglove_bridge``: serves ROS topics to Foxglove and Lichtblick.
 
-A server of https://github.com/foxglove/ws-protocol that shows: no client moves a robot by it.
+Read-only server of https://github.com/foxglove/ws-protocol: clients cannot move the robot.
 """
 
 from __future__ import annotations
@@ -50,45 +50,45 @@ from ..page.gate import is_loopback, shown_host
 from .interfaces import serve
 
 NAME = 'foxglove_bridge'
-NICENESS = 10  # no viewer takes time that a control loop needs
+NICENESS = 10  # a viewer must not delay a control loop
 PORT = 8765
 PROTOCOLS = [Subprotocol('foxglove.sdk.v1'), Subprotocol('foxglove.websocket.v1')]
-"""Of clients of today, and of those from before foxglove-sdk; what they share is all there is."""
+"""Current clients, and those before foxglove-sdk; the server uses their common subset only."""
 FOXGLOVE_ORIGINS = ('https://app.foxglove.dev', 'file://')
-"""Foxglove in a browser, and desktop programs, whose pages are files of their own."""
+"""Foxglove in a browser, and desktop programs, which load their pages from files."""
 MESHES = re.compile(
     r'package://(?:[-\w%]+/)+[-.\w%]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff'
     r'|urdf|webp|xacro)'
 )
-"""Meshes and what belongs to them, of installed packages."""
+"""Meshes of installed packages, and files that meshes refer to."""
 MESSAGE_DATA, ASSET = 1, 4
-"""First byte of a message of a topic, and of an answer to a request for a file."""
+"""First byte of a topic message, and of a file response."""
 WAITING = 10_000_000
-"""Bytes that wait for a slow client; messages of topics beyond are left out for it."""
-LOOK_PERIOD = 1.0  # time between two looks at the graph in [s]
+"""Send buffer limit per client in [byte]; a slow client misses topic messages beyond it."""
+LOOK_PERIOD = 1.0  # time between two scans of the ROS graph in [s]
 UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
-"""Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
-a subscription."""
-WARNING, ERROR = 1, 2  # levels of a status of the protocol
-QUOTED = 80  # length of a text that is not understood in its refusal, at most
-ID_END = 2**32  # numbers that clients give are below; messages carry them as uint32
-CLOSE_TIMEOUT = 1.0  # time for a client to answer that the connection ends, in [s]
+"""Assumed depth of a publisher whose depth DDS does not report, and the maximum depth of a
+subscription."""
+WARNING, ERROR = 1, 2  # status levels of the protocol
+QUOTED = 80  # maximum length of an invalid text quoted in an error
+ID_END = 2**32  # exclusive maximum of ids that clients choose; sent as uint32
+CLOSE_TIMEOUT = 1.0  # time for a client to acknowledge the close in [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Admission:
     """Decides who may connect.
 
-    A browser lets any page connect to a port of this computer, and names the page's site in the
-    header Origin, which the page cannot change. Programs send none.
+    A browser lets any page connect to a port of this computer, and sends the page's site in the
+    Origin header, which the page cannot change. Other programs send no Origin.
     """
 
     origins: frozenset[str]
-    """Sites whose pages may connect, besides those of this host; `*` for all."""
-    token: str  # what a client has to have in its URL; empty where none is needed
+    """Sites whose pages may connect in addition to this host's; `*` for all."""
+    token: str  # required in the client's URL; empty if not required
 
     def refusal(self, path: str, origins: Sequence[str]) -> str:
-        """Return why a request is refused; empty when it is not."""
+        """Return why a request is refused; empty if it is accepted."""
         for origin in origins:
             host = urlsplit(origin).hostname
             local = host is not None and is_loopback(host)
@@ -102,28 +102,28 @@ class Admission:
 
 @dataclass(eq=False, slots=True)
 class _Channel:
-    """A topic that is offered."""
+    """A topic advertised to clients."""
 
     type: str
     kind: Any  # class of its messages
-    offer: dict[str, object]  # what clients know of it
-    subscription: Subscription | None = None  # there while a client wants it
+    offer: dict[str, object]  # its advertisement
+    subscription: Subscription | None = None  # exists while a client subscribes
     qos: QoSProfile | None = None  # of the subscription
 
 
 class Server:
-    """The clients, in a thread of their own; ``wanted`` is called with a topic."""
+    """WebSocket server in its own thread; calls ``wanted`` with each newly subscribed topic."""
 
     def __init__(
         self, address: tuple[str, int], admission: Admission, wanted: Callable[[str], None]
     ) -> None:
-        """Listen; port 0 is a free one.
+        """Start listening; port 0 selects a free one.
 
         Raises:
             OSError: The address cannot be bound.
         """
         self._admission, self._wanted = admission, wanted
-        # of each client the topics that it wants, by the numbers that it gave them
+        # topics of each client by the subscription ids that it chose
         self._clients: dict[ServerConnection, dict[int, str]] = {}
         self._offers: dict[str, dict[str, object]] = {}
         self._loop = asyncio.new_event_loop()
@@ -151,12 +151,12 @@ class Server:
 
     @property
     def wanted(self) -> frozenset[str]:
-        """The topics that clients want."""
+        """Topics with at least one subscribed client."""
         clients = tuple(self._clients.values())
         return frozenset(topic for topics in clients for topic in tuple(topics.values()))
 
     def post(self, act: Callable[..., None], *values: object) -> None:
-        """Have something done in the thread of the server."""
+        """Call a function in the server's thread."""
         self._loop.call_soon_threadsafe(act, *values)
 
     def close(self) -> None:
@@ -178,22 +178,22 @@ class Server:
         return connection.respond(HTTPStatus.FORBIDDEN, f'{refusal}\n') if refusal else None
 
     def publish(self, operation: str, values: dict[str, object]) -> None:
-        """Send an operation of the protocol to all clients."""
+        """Send a protocol operation to all clients."""
         broadcast(self._clients, json.dumps({'op': operation, **values}))
 
     def offer(self, topic: str, offer: dict[str, object]) -> None:
-        """Offer a topic to all clients, also to those that come later."""
+        """Advertise a topic to all present and future clients."""
         self._offers[topic] = offer
         self.publish('advertise', {'channels': [offer]})
 
     def withdraw(self, topic: str) -> None:
-        """Offer a topic no more."""
+        """Stop advertising a topic."""
         for client, topics in self._clients.items():
             self._clients[client] = {n: each for n, each in topics.items() if each != topic}
         self.publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
 
     def send(self, topic: str, stamp: int, data: bytes) -> None:
-        """Send a message that came at a time in [ns]."""
+        """Send a message to subscribed clients; ``stamp`` is its receive time in [ns]."""
         for client, topics in self._clients.items():
             if client.transport.get_write_buffer_size() > WAITING:
                 continue
@@ -245,7 +245,7 @@ class Server:
 
 
 def _accepts(client: ServerConnection, what: str, number: object) -> bool:
-    """Return whether messages can carry a number; refuse one that they cannot."""
+    """Return whether an id fits the protocol; send the client an error if not."""
     fits = type(number) is int and 0 <= number < ID_END
     if not fits:
         _refuse(client, f'{what} {number!r}: give it a whole number from 0 to {ID_END - 1}')
@@ -257,11 +257,11 @@ def _refuse(client: ServerConnection, text: str) -> None:
 
 
 def _asset(request: int, uri: str) -> bytes:
-    """Answer with a mesh of a package, or what belongs to one, or with why it is not sent."""
+    """Return the response to an asset request: a mesh or related file, or an error."""
     data, failure = b'', b''
     if not MESHES.fullmatch(uri):
         failure = f'{uri} is no mesh or image of a package (package://)'.encode()
-    # also as %2e%2e, which is decoded before the file is looked for
+    # also as %2e%2e, which is decoded before the file lookup
     elif '..' in PurePosixPath(unquote(uri)).parts:
         failure = f'{uri} leaves its package; write it without ..'.encode()
     else:
@@ -273,11 +273,11 @@ def _asset(request: int, uri: str) -> bytes:
 
 
 class FoxgloveBridge(Node):
-    """Offers all topics, and subscribes to those that a client wants."""
+    """Advertises all topics, and subscribes to those that a client requests."""
 
     @destroyed_when_refused
     def __init__(self) -> None:
-        """Listen.
+        """Start the server.
 
         Raises:
             ParameterError: A parameter is wrong, or the port is in use.
@@ -317,13 +317,13 @@ class FoxgloveBridge(Node):
         self._server.close()
 
     def _want(self, topic: str) -> None:
-        """Subscribe for a client; called in the thread of the server."""
+        """Request a subscription for a client; called in the server's thread."""
         self._fresh.append(topic)
         if self.executor is not None:
             self.executor.create_task(self._match)
 
     def _look(self) -> None:
-        """Offer what has appeared, and withdraw what has gone."""
+        """Advertise new topics, and withdraw those that are gone."""
         there = {
             name: types[0]
             for name, types in self.get_topic_names_and_types()
@@ -360,7 +360,7 @@ class FoxgloveBridge(Node):
         self._server.post(self._server.offer, name, offer)
 
     def _match(self) -> None:
-        """Subscribe to what clients want; to what is latched anew for one that is new."""
+        """Update subscriptions; resubscribe to latched topics for new clients."""
         while self._fresh:
             channel = self._channels.get(self._fresh.popleft())
             qos = None if channel is None else channel.qos
@@ -388,7 +388,7 @@ class FoxgloveBridge(Node):
         self._server.post(self._server.send, topic, stamp, data)
 
     def _qos(self, name: str) -> QoSProfile:
-        """Return what connects to all publishers, and gets what they keep where all keep it."""
+        """Return a QoS compatible with all publishers; transient local if all of them are."""
         offers = [each.qos_profile for each in self.get_publishers_info_by_topic(name)]
         reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in offers)
         latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
@@ -403,10 +403,10 @@ class FoxgloveBridge(Node):
 
 
 def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
-    """Return the class of a message by its name as `package/msg/Name`.
+    """Return the message class of a type name such as `package/msg/Name`.
 
     Raises:
-        LookupError: It is not installed.
+        LookupError: The message type is not installed.
     """
     try:
         package, folder, base = name.split('/')
@@ -416,7 +416,7 @@ def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
 
 
 def main() -> int:
-    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
+    """Run until Ctrl-C; return 0, or 1 if it could not start."""
     return run_program(NAME, _serve)
 
 

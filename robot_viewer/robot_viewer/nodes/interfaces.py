@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The interfaces of one robot, as its viewers use them.
+"""ROS interfaces of one robot, shared by its viewers.
 
-Its nodes among those of other robots, services and actions that nothing waits for, and how a
-viewer is served.
+Finds the robot's nodes among those of others, calls services and actions without blocking, and
+runs a viewer node.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from node_runner import log_as, notify_ready, spin
 if TYPE_CHECKING:
     from rclpy.action.client import ActionClient
 
-DESCRIPTION = '/robot_description'  # what each robot has in its namespace
+DESCRIPTION = '/robot_description'  # topic of each robot, in its namespace
 SET_NMT_TYPE, SET_MODE_TYPE = 'canopen_interfaces/srv/CONmtID', 'quad_msgs/srv/SetMode'
-"""Of services that only a master of drives has, and only the controller of a walking robot."""
+"""Service types that only a CANopen master has, and only a walking robot's controller."""
 
 
 def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> list[str]:
-    """Return the nodes of one robot: no other one's namespace is nearer to them.
+    """Return the nodes of one robot: those whose closest robot namespace is its own.
 
-    All names are full ones; ``description`` is the topic with that of the robot.
+    All names are fully qualified; ``description`` is the robot's description topic.
     """
     robots = {name.removesuffix(DESCRIPTION) for name in topics if name.endswith(DESCRIPTION)}
     own = description.removesuffix(DESCRIPTION)
@@ -47,7 +47,7 @@ def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> l
 
 
 def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
-    """Return whether the `stop` of a node is that of a robot: it leads drives, or legs."""
+    """Return whether a node's `stop` stops the robot: it controls drives or legs."""
     beside = node.rpartition('/')[0]
     return SET_NMT_TYPE in services.get(f'{node}/set_nmt', ()) or SET_MODE_TYPE in services.get(
         f'{beside}/set_mode', ()
@@ -58,14 +58,14 @@ TRIGGER = 'std_srvs/srv/Trigger'
 
 
 class Report(Protocol):
-    """Where it is said what became of a request."""
+    """Callback that reports the outcome of a request."""
 
     def __call__(self, text: str, *, failed: bool) -> None:
-        """Say it in words."""
+        """Report the outcome."""
 
 
 class TriggerCalls:
-    """Clients of Trigger services; everything in the thread of the node."""
+    """Clients of Trigger services. Call in the node's thread."""
 
     def __init__(self, node: Node, report: Report) -> None:
         self._node, self._report = node, report
@@ -74,23 +74,23 @@ class TriggerCalls:
 
     @property
     def running(self) -> str:
-        """What was requested last and is not answered yet, in words; empty for nothing."""
+        """Label of the last unanswered request; empty for none."""
         return next(reversed(self._running), '')
 
     def forget(self, services: frozenset[str]) -> None:
-        """Wait for no answer of services that are none of these."""
+        """Stop waiting for services that are not among these."""
         self._running = {w: each for w, each in self._running.items() if services >= set(each)}
 
     def client(self, service: str) -> Any:  # noqa: ANN401  # requests have no type
-        """Return the client of a service, which finds its server in time when made early."""
+        """Return the client of a service; create it early, since discovery takes time."""
         if service not in self._clients:
-            from std_srvs.srv import Trigger  # the bridge to Foxglove calls none
+            from std_srvs.srv import Trigger  # the Foxglove bridge does not need it
 
             self._clients[service] = self._node.create_client(Trigger, service)
         return self._clients[service]
 
     def call(self, service: str, take: Callable[[bool, str], None]) -> None:
-        """Call a service; ``take`` gets whether that has succeeded, and the answer in words."""
+        """Call a service; ``take`` receives success and answer text."""
         client = self.client(service)
         if not client.service_is_ready():
             take(False, 'its service is not there')
@@ -101,7 +101,7 @@ class TriggerCalls:
     def call_all(
         self, what: str, services: Sequence[str], done: Callable[[bool], None] = lambda _: None
     ) -> None:
-        """Call services at the same time; report all answers at once, the failures first."""
+        """Call services in parallel; report all answers together, failures first."""
         answers: dict[str, tuple[bool, str]] = {}
 
         def take(service: str, ok: bool, text: str) -> None:
@@ -125,31 +125,31 @@ class TriggerCalls:
 
 
 def succeeded(call: Future) -> bool:
-    """Return whether a call was answered with success."""
+    """Return whether a call succeeded."""
     return call.exception() is None and bool(call.result().success)
 
 
 def text_of(call: Future) -> str:
-    """Return what a call was answered with, in words."""
+    """Return the answer text of a call."""
     error = call.exception()
     return f'no answer: {error}' if error is not None else str(call.result().message)
 
 
 Done = Callable[['ActionCall', Any, str], None]
-"""Takes a goal and its result, or None and why there is none."""
+"""Called with a goal and its result, or with None and the reason."""
 
 
 class ActionCall:
-    """A goal that may be canceled at any time, also before the server has answered."""
+    """An action goal that can be canceled at any time, even before the server answers."""
 
     def __init__(self, client: ActionClient, goal: Any, done: Done) -> None:  # noqa: ANN401
-        """Send it."""
+        """Send the goal."""
         self._done, self._handle = done, None
         self._is_canceled = self.ended = False
         client.send_goal_async(goal).add_done_callback(self._answered)
 
     def cancel(self) -> None:
-        """Cancel it."""
+        """Cancel the goal."""
         if self._is_canceled:
             return
         self._is_canceled = True
@@ -182,7 +182,7 @@ class ActionCall:
 
 
 class Border:
-    """Where errors of what comes from ROS end: said once in a sentence, and all else goes on."""
+    """Catches errors in ROS callbacks: reports each once, and lets the node continue."""
 
     def __init__(self, node: Node, say: Callable[[str], None] = lambda _: None) -> None:
         self._node, self._say = node, say
@@ -190,10 +190,10 @@ class Border:
 
     @contextmanager
     def around(self, what: str) -> Iterator[None]:
-        """Report what the block raises, and go on behind it."""
+        """Report an exception of the block instead of raising it."""
         try:
             yield
-        except Exception as error:  # noqa: BLE001  # whatever comes from ROS
+        except Exception as error:  # noqa: BLE001  # ROS input can raise anything
             self.report(what, error)
 
     def report(self, what: str, error: Exception) -> None:
@@ -221,10 +221,10 @@ def serve(
     stop: threading.Event,
     border: Border | None = None,
 ) -> None:
-    """Serve a viewer until it is to end, and let its viewers go."""
+    """Run a viewer until ``stop`` is set, then close its connections."""
     border = border or Border(node)
     log_as(node)
-    sys.stdout.write(f'{seen_at}\n')  # not into /rosout and bags: it may have a token
+    sys.stdout.write(f'{seen_at}\n')  # not to /rosout and bags: it may contain a token
     sys.stdout.flush()
     notify_ready(seen_at)
     try:

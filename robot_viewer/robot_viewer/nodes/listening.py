@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that are there while a page is open, and read when it is drawn."""
+"""Subscriptions that exist while a page is open, and are read when it is drawn."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 LINGER = 5.0
-"""How long it goes on after the last look in [s]: a page that is loaded anew needs it at once."""
+"""Time in [s] that subscriptions outlive the last open page: a reload needs them immediately."""
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 BETWEEN_LOOKS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Of topics with several publishers: it keeps what comes from one look to the next.
+"""QoS for topics with several publishers: buffers the messages between two reads.
 
-At rest, with ten looks a second, that holds up to 500 Hz of all publishers together; of more the
-oldest is lost.
+At rest, with ten reads per second, it buffers up to 500 Hz of all publishers together; beyond
+that the oldest messages are lost.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic that is read."""
+    """A topic to read, and its handler."""
 
     kind: Any  # class of its messages
     name: str
     take: Callable[[Any], bool | None]
-    """Takes the newest message; for some it returns whether such ones are of no interest."""
+    """Handles the newest message; may return True to ignore messages with this key from now on."""
     qos: QoSProfile  # of the subscription
-    by: Callable[[bytes], Hashable]  # of messages that differ in this, each newest one is taken
+    by: Callable[[bytes], Hashable]  # key of a message; the newest one per key is handled
 
 
 def joints_of(data: bytes) -> Hashable:
     """Return the frame of a JointState and the names of its joints."""
-    frame, at = _strings(data, 12, 1)  # behind its stamp
+    frame, at = _strings(data, 12, 1)  # after its stamp
     joints, _ = _strings(data, at + 4, _whole(data, at))
     return frame + joints
 
@@ -49,14 +49,14 @@ def frames_of(data: bytes) -> Hashable:
     """Return the names of all frames of a TFMessage."""
     frames, at = tuple[bytes, ...](), 8
     while at < len(data):
-        pair, at = _strings(data, at + 8, 2)  # behind a stamp
+        pair, at = _strings(data, at + 8, 2)  # after a stamp
         frames += pair
-        at += (4 - at) % 8 + 56  # seven doubles; CDR aligns them from behind its head of 4 bytes
+        at += (4 - at) % 8 + 56  # seven doubles, aligned from the end of CDR's 4-byte header
     return frames
 
 
 def _strings(data: bytes, at: int, count: int) -> tuple[tuple[bytes, ...], int]:
-    """Return strings in CDR, without what is between them (any bytes), and the place behind."""
+    """Return consecutive CDR strings without padding (any bytes), and the offset after them."""
     found = list[bytes]()
     while len(found) < count and at < len(data):
         end = at + 4 + _whole(data, at)
@@ -70,10 +70,10 @@ def _whole(data: bytes, at: int) -> int:
 
 
 class Listening:
-    """Reads topics as long as a page is open.
+    """Reads topics while a page is open.
 
-    No executor serves the subscriptions, which are in a group of their own: a wake-up for each
-    message costs more than all else. At each look the newest message of each kind is decoded.
+    No executor serves the subscriptions, which have their own callback group: a wake-up per
+    message costs more than all else. Each read decodes only the newest message of each key.
     """
 
     def __init__(self, node: Node) -> None:
@@ -85,7 +85,7 @@ class Listening:
 
     @property
     def active(self) -> bool:
-        """Whether it is subscribed."""
+        """Whether the topics are subscribed."""
         return bool(self._made)
 
     def add(
@@ -96,7 +96,7 @@ class Listening:
         qos: QoSProfile = NEWEST,
         by: Callable[[bytes], Hashable] = lambda _: None,
     ) -> None:
-        """Read a topic while a page is open, see :class:`Topic`."""
+        """Add a topic; see :class:`Topic`."""
         self._topics.append(Topic(kind, name, take, qos, by))
         if self._made:
             self._subscribe(self._topics[-1])
@@ -108,7 +108,7 @@ class Listening:
         self._made.append((topic, made, set()))
 
     def newest(self) -> Iterator[Callable[[], None]]:
-        """Yield what processes each message that is new."""
+        """Yield one function per new message, which processes it."""
         for topic, subscription, dropped in self._made:
             found = dict[Hashable, bytes]()
             with subscription.handle:
@@ -126,7 +126,7 @@ class Listening:
             dropped.add(key)
 
     def update(self, now: float, *, looked_at: bool) -> bool:
-        """Begin or end; return whether it has just begun."""
+        """Subscribe or unsubscribe; return whether it has just subscribed."""
         if looked_at:
             self._last_look = now
             begins = not self._made

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be planned for, and what was planned, in MoveIt's messages.
+"""Conversions between MoveIt messages and plan groups, goals and planned motions.
 
-The package needs moveit_msgs only where something is planned.
+The package needs moveit_msgs only for planning.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from urdf_reader import (
 
 Message: TypeAlias = Any  # messages have no types
 
-LINE_POINTS = 80  # of the line that the tip follows
-PAUSE = 0.8  # between two showings of a plan in [s]
+LINE_POINTS = 80  # of the drawn tip path
+PAUSE = 0.8  # between two replays of a plan in [s]
 SHOWINGS = 3
-"""How often a plan is shown."""
+"""Number of replays of a plan."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlanGroup:
-    """A group of joints that motions are planned for."""
+    """An SRDF group for which motions can be planned."""
 
     name: str
-    joints: tuple[str, ...]  # its joints, from the base out
-    tip: str  # link that a goal in space is for
+    joints: tuple[str, ...]  # from the base to the tip
+    tip: str  # link to which a Cartesian goal applies
     states: Mapping[str, Mapping[str, float]]
-    """Positions in [rad] or [m] by joint, by the name of the state."""
+    """Named states: joint positions in [rad] or [m] by joint."""
 
 
 def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
     """Return the groups of an SRDF that can move, arms first.
 
     Raises:
-        DescriptionError: It is no SRDF, or none of its groups can move.
+        DescriptionError: The text is not an SRDF, or no group can move.
     """
     description = parse_srdf(semantic)
     found, reasons = {}, []
@@ -71,7 +71,7 @@ def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
 
 @dataclass(frozen=True, slots=True)
 class PlannedMotion:
-    """A motion from its start to its goal."""
+    """A planned trajectory."""
 
     joints: tuple[str, ...]  # the joints that move
     times: tuple[float, ...]  # of its points in [s], increasing
@@ -79,16 +79,16 @@ class PlannedMotion:
 
     @property
     def duration(self) -> float:
-        """How long it takes in [s]."""
+        """Duration in [s]."""
         return self.times[-1] if self.times else 0.0
 
     def at(self, time: float) -> dict[str, float]:
-        """Return where the joints are at a time in [s], which rest before and after the motion."""
+        """Return the joint positions at a time in [s], clamped to the ends of the motion."""
         tracks = zip(self.joints, zip(*self.points, strict=True), strict=True)
         return {joint: float(np.interp(time, self.times, track)) for joint, track in tracks}
 
     def shown(self, elapsed: float) -> dict[str, float] | None:
-        """Return where the joints are as it is shown again and again; None when that has ended."""
+        """Return the joint positions of the replay; None after the last one."""
         number, time = divmod(elapsed, self.duration + PAUSE)
         return self.at(time) if number < SHOWINGS else None
 
@@ -96,7 +96,7 @@ class PlannedMotion:
 def tip_line(
     tree: KinematicTree, tip: str, beside: Mapping[str, float], motion: PlannedMotion
 ) -> list[Vector]:
-    """Return the places in the root link where a link passes, in [m]."""
+    """Return points of a link's path in the root link frame in [m]."""
     step = motion.duration / (LINE_POINTS - 1)
     return [
         link_poses(tree, {**beside, **motion.at(number * step)})[tip].translation
@@ -104,14 +104,14 @@ def tip_line(
     ]
 
 
-PLANNING_TIME = 5.0  # that is allowed in [s]
+PLANNING_TIME = 5.0  # allowed by a request in [s]
 JOINT_TOLERANCE = 1e-3  # of goals in [rad] or [m]
 
 
 def plan_goal(group: PlanGroup, goal: Mapping[str, float], share: float) -> Message:
-    """Return a moveit_msgs/MoveGroup goal that is planned, and not executed.
+    """Return a plan-only moveit_msgs/MoveGroup goal.
 
-    ``share`` is that of the greatest velocity and acceleration, above 0 to 1.
+    ``share`` is the velocity and acceleration scaling factor, above 0 to 1.
     """
     moveit = import_module('moveit_msgs.msg')
     message = import_module('moveit_msgs.action').MoveGroup.Goal()
@@ -138,7 +138,7 @@ def plan_goal(group: PlanGroup, goal: Mapping[str, float], share: float) -> Mess
 def ik_request(
     group: PlanGroup, pose: Transform, frame: str, near: Mapping[str, float]
 ) -> Message:
-    """Return a request of compute_ik for a pose of the tip in a frame, near some positions."""
+    """Return a compute_ik request for a tip pose in a frame, seeded with ``near``."""
     message = import_module('moveit_msgs.srv').GetPositionIK.Request()
     asked = message.ik_request
     asked.group_name, asked.ik_link_name, asked.avoid_collisions = group.name, group.tip, True
@@ -163,7 +163,7 @@ def planned_motion(trajectory: Message) -> PlannedMotion:
 
 
 def refusal(error_code: Message) -> str:
-    """Return why something was refused, in words; empty where it was not."""
+    """Return the text of an error code; empty for success."""
     kind = type(error_code)
     if error_code.val == kind.SUCCESS:
         return ''
@@ -176,7 +176,7 @@ def refusal(error_code: Message) -> str:
 def box_message(
     name: str, size: tuple[float, float, float], pose: Transform, frame: str
 ) -> Message:
-    """Return a scene to which a box comes, of a size in [m] about a pose in a frame."""
+    """Return a scene diff that adds a box with edges in [m], centred at a pose in a frame."""
     solid = import_module('shape_msgs.msg').SolidPrimitive
     box = solid(type=solid.BOX, dimensions=list(size))
     shapes = {'pose': pose_message(pose), 'primitives': [box], 'primitive_poses': [Pose()]}
@@ -184,7 +184,7 @@ def box_message(
 
 
 def scene_change(operation: str, name: str, header: Header, **values: object) -> Message:
-    """Return a scene in which an operation of moveit_msgs/CollisionObject changes an object."""
+    """Return a scene diff that applies a moveit_msgs/CollisionObject operation to an object."""
     moveit = import_module('moveit_msgs.msg')
     code = getattr(moveit.CollisionObject, operation)
     thing = moveit.CollisionObject(id=name, header=header, operation=code, **values)
@@ -195,15 +195,15 @@ def scene_change(operation: str, name: str, header: Header, **values: object) ->
 
 
 def transform_of(pose: Pose) -> Transform:
-    """Return the pose of a geometry_msgs/Pose; one without a rotation has none."""
+    """Convert a geometry_msgs/Pose; an all-zero quaternion becomes the identity."""
     place, turn = pose.position, pose.orientation
     rotation = (turn.x, turn.y, turn.z, turn.w)
-    if not any(rotation):  # a message that leaves it out
+    if not any(rotation):  # the message left it out
         return Transform((place.x, place.y, place.z))
     return Transform((place.x, place.y, place.z), rotation)
 
 
 def pose_message(pose: Transform) -> Pose:
-    """Return a geometry_msgs/Pose."""
+    """Convert to a geometry_msgs/Pose."""
     (x, y, z), (a, b, c, d) = pose.translation, pose.rotation
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=d))

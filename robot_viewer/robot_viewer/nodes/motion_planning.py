@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plans and their execution by move_group, for people at the page: what any client may do."""
+"""Planning and execution by move_group from the page, as an ordinary client of move_group."""
 
 from __future__ import annotations
 
@@ -45,23 +45,23 @@ OFFERED = {
     f'{MOVE}/_action/send_goal': 'moveit_msgs/action/MoveGroup_SendGoal',
     f'{EXECUTE}/_action/send_goal': 'moveit_msgs/action/ExecuteTrajectory_SendGoal',
 }
-"""Services that say that there is a move_group."""
-ANSWER_TIME = 2.0  # time in [s] after which an answer counts as lost
+"""Services that identify a move_group."""
+ANSWER_TIME = 2.0  # service timeout in [s]
 STOP = 'stop'  # the event that ends every execution
-NO_GOAL, DRAGGED = 'none', 'dragged in the view'  # goals that are no states of the SRDF
+NO_GOAL, DRAGGED = 'none', 'dragged in the view'  # goals that are not SRDF states
 HOLD_EXECUTE = 'Hold to execute'
 GHOST_TINT: Tint = (0.05, 0.52, 0.6, 0.4)
 LINE_COLOR = (24, 100, 171)
 LINE_WIDTH = 3.0  # in [px]
-GOAL_SIZE = 0.22  # of the arrows by which the goal is dragged in [m]
+GOAL_SIZE = 0.22  # of the goal's drag handles in [m]
 
 
 class MotionPlanning:
-    """What people plan; everything in the thread of the node, and nothing waits.
+    """Plans and executes motions for the page. Call in the node's thread; never blocks.
 
     Attributes:
-        offered: It is on the page; what it shows there is made with that.
-        hold: Number of the button that executes.
+        offered: Whether the panel is on the page; its elements exist only then.
+        hold: Number of the execute button.
         scene: The planning scene of move_group.
     """
 
@@ -72,7 +72,7 @@ class MotionPlanning:
         positions: Mapping[str, float],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        """Find no move_group yet."""
+        """Start without a move_group."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
         self._connected = self.offered = False
         self.hold = 0
@@ -80,19 +80,19 @@ class MotionPlanning:
         self._groups: Mapping[str, PlanGroup] = {}
         self._group = PlanGroup('', (), '', {})
         self._goal = NO_GOAL
-        self._pose: Transform | None = None  # where the tip is dragged to, until it is solved
-        self._joints: dict[str, float] = {}  # of the goal; none where none is known
-        self._asked: float | None = None  # when inverse kinematics were asked for
+        self._pose: Transform | None = None  # dragged tip pose until IK has solved it
+        self._joints: dict[str, float] = {}  # of the goal; empty if unknown
+        self._asked: float | None = None  # time of the pending IK request
         self._planning: ActionCall | None = None
         self._trajectory: Message = None
         self._motion: PlannedMotion | None = None
         self._shown_since: float | None = None
         self._execution: ActionCall | None = None
-        self._canceled_as = ''  # why the page has canceled it
-        self._held_at = 0.0  # when the button of the execution was seen to be held
+        self._canceled_as = ''  # why the page canceled it
+        self._held_at = 0.0  # last heartbeat of the execute button
         self._executed_goal: tuple[str, dict[str, float]] = (NO_GOAL, {})
         self._ghost: RobotScene | None = None
-        self._links: frozenset[str] = frozenset()  # that the group moves
+        self._links: frozenset[str] = frozenset()  # moved by the group
         self._line: LineSegmentsHandle | None = None
         self._gizmo: TransformControlsHandle | None = None
         self.scene = PlanningScene(node, page, self.ordered, self.say)
@@ -100,7 +100,7 @@ class MotionPlanning:
     # -- what there is
 
     def look(self, services: Mapping[str, Sequence[str]]) -> None:
-        """Find a move_group in the namespace of the node."""
+        """Discover a move_group in the node's namespace."""
         there = all(
             kind in services.get(self._node.resolve_service_name(name), ())
             for name, kind in OFFERED.items()
@@ -163,7 +163,7 @@ class MotionPlanning:
         self.choose_group(next(iter(self._groups)))
 
     def remove(self) -> None:
-        """Remove it from the page: another robot comes."""
+        """Remove the panel from the page before another robot is shown."""
         self._drop()
         self.offered, self._pose = False, None
         self._page.live.remove(self.hold)
@@ -176,7 +176,7 @@ class MotionPlanning:
     # -- what people do
 
     def order(self, action: Callable[[], object]) -> None:
-        """Carry out an action of the page, unless it belongs to a robot that has gone."""
+        """Run an action of the page in the node's thread, unless its robot is no longer shown."""
 
         def act() -> None:
             if self.offered:
@@ -185,15 +185,15 @@ class MotionPlanning:
         self._order(act)
 
     def ordered(self, action: Callable[..., object]) -> Callable[..., None]:
-        """Return what has an action carried out in the thread of the node."""
+        """Return a function that runs an action in the node's thread."""
         return lambda *values: self.order(partial(action, *values))
 
     def show_again(self) -> None:
-        """Show once more what was planned."""
+        """Replay the plan."""
         self._shown_since = time.monotonic() if self._motion else None
 
     def stop(self) -> None:
-        """End what is executed and planned, also of others; nothing planned stays executable."""
+        """Stop all execution and planning, also for other clients, and discard the plan."""
         if self._connected:
             self._events.publish(String(data=STOP))
             if self._execution is not None:
@@ -201,11 +201,11 @@ class MotionPlanning:
             self._drop()
 
     def go_on(self, at: float) -> None:
-        """Go on with the execution: its button was seen to be held at a steady time in [s]."""
+        """Continue the execution: its button was held at steady time ``at`` in [s]."""
         self._held_at = at
 
     def let_go(self) -> None:
-        """Cancel the execution: its button was let go."""
+        """Cancel the execution after its button was released."""
         self._cancel('its button was let go')
 
     def _cancel(self, why: str) -> None:
@@ -215,21 +215,21 @@ class MotionPlanning:
 
     @property
     def busy(self) -> bool:
-        """Whether a plan is executed."""
+        """Whether a plan is being executed."""
         return self._execution is not None
 
     @property
     def moves(self) -> bool:
-        """Whether a plan is executed, or a ghost goes along it."""
+        """Whether a plan is being executed or replayed."""
         return self.busy or self._shown_since is not None
 
     def advance(self) -> None:
-        """Cancel the execution when nothing holds its button any more."""
+        """Cancel the execution if heartbeats of its button are overdue."""
         if self.busy and time.monotonic() - self._held_at > RELEASED_AFTER:
             self._cancel('heartbeats of its held button came late')
 
     def draw(self) -> None:
-        """Show the next picture of a plan, if it is being shown."""
+        """Draw the next frame of the replay, if one is running."""
         if self._motion is None or self._shown_since is None:
             return
         places = self._motion.shown(time.monotonic() - self._shown_since)
@@ -238,7 +238,7 @@ class MotionPlanning:
         self._show_ghost(places)
 
     def choose_group(self, name: str) -> None:
-        """Plan for another group."""
+        """Select the planning group."""
         self._group = self._groups[name]
         self._group_box.value = name  # type: ignore[misc]  # it has a setter
         self.goal.options = (NO_GOAL, DRAGGED, *self._group.states)
@@ -250,7 +250,7 @@ class MotionPlanning:
         self.choose_goal(NO_GOAL)
 
     def choose_goal(self, name: str) -> None:
-        """Go to a state of the SRDF, or to where the goal is dragged."""
+        """Select an SRDF state or the dragged pose as the goal."""
         self._drop()
         self._goal, self._pose, self._joints = name, None, {}
         if name in self._group.states or name == DRAGGED:
@@ -277,14 +277,14 @@ class MotionPlanning:
         self.order(partial(self.drag_goal, pose_of(event.target)))  # coroutines keep their order
 
     def drag_goal(self, pose: Transform) -> None:
-        """Set the goal of the tip to a pose in the root link."""
+        """Set the goal to a tip pose in the root link frame."""
         self._drop()
         self._goal, self._pose = DRAGGED, pose
         self.goal.value = DRAGGED  # type: ignore[misc]
         self._solve()
 
     def _solve(self) -> None:
-        """Solve for joints that bring the tip to the dragged pose; one request at a time."""
+        """Solve IK for the dragged tip pose; one request at a time."""
         pose, now = self._pose, time.monotonic()
         if pose is None or (self._asked is not None and now - self._asked < ANSWER_TIME):
             return
@@ -310,11 +310,11 @@ class MotionPlanning:
         if asked != self._pose:
             self._solve()
         else:
-            self._pose = self._pose if reason else None  # else the joints are the goal
+            self._pose = self._pose if reason else None  # after success the joints are the goal
             self.say(reason, failed=True)
 
     def plan(self) -> None:
-        """Plan, at the speed of the page."""
+        """Plan at the speed set on the page."""
         reason = ''
         if not self._joints:
             reason = 'choose a goal first: a state, or one that is dragged'
@@ -334,7 +334,7 @@ class MotionPlanning:
 
     def _planned(self, call: ActionCall, result: Message, why: str) -> None:
         if call is not self._planning:
-            return  # of a request that counts no more
+            return  # of an outdated request
         self._planning = None
         reason = why or refusal(result.error_code)
         if reason:
@@ -362,9 +362,9 @@ class MotionPlanning:
         )
 
     def execute(self, at: float) -> None:
-        """Execute what was planned; the button was seen to be held at a steady time in [s]."""
+        """Execute the plan; its button was held at steady time ``at`` in [s]."""
         if time.monotonic() - at > RELEASED_AFTER:
-            return  # this node was held up; the button may be let go
+            return  # this node was delayed; the button may be released
         if self._trajectory is None or self._motion is None:
             self.say('nothing is planned that may be executed', failed=True)
             return
@@ -390,11 +390,11 @@ class MotionPlanning:
             reason = f'ended, as {self._canceled_as} ({reason})'
         self._page.live.end(self.hold)
         if self.offered and not reason and self._executed_goal == (self._goal, self._joints):
-            self.choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
+            self.choose_goal(NO_GOAL)  # unless another one was selected meanwhile
         self.say(reason or 'executed', failed=bool(reason))
 
     def _drop(self) -> None:
-        """Forget what is planned or being planned."""
+        """Discard the plan, and cancel planning."""
         if self._planning is not None:
             self._planning.cancel()
             self._planning = None
@@ -409,14 +409,14 @@ class MotionPlanning:
     # -- what is shown
 
     def _show_ghost(self, goals: Mapping[str, float]) -> None:
-        """Show the robot with joints at goals."""
+        """Show a ghost of the robot with joints at goals."""
         if self._ghost is None:
             self._ghost = self._robot.ghost('ghost', self._links, GHOST_TINT)
         self._ghost.place(moved(self._robot.tree, self._positions, goals))
         self._ghost.show(seen=True)
 
     def say(self, text: str, *, failed: bool | None = None) -> None:
-        """Show what became of the last request."""
+        """Show the outcome of the last request."""
         if self.offered:
             mark = PLAIN if failed is None else BAD if failed else GOOD
             self.outcome.content = line(text, mark) if text else ''

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The planning scene on the page: what is in it, and boxes that come, move and go."""
+"""The planning scene on the page: shows its objects; adds, moves and removes boxes."""
 
 from __future__ import annotations
 
@@ -35,58 +35,58 @@ from ..page.style import add_button, add_choice
 from .interfaces import Report
 from .motion_plan import box_message, Message, pose_message, scene_change, transform_of
 
-WORLD_AND_ATTACHED = 16 | 4  # of moveit_msgs/PlanningSceneComponents
-AHEAD = 0.6  # how far before the root link a new box comes, in [m]
-ANSWER_TIME = 2.0  # time in [s] after which an answer counts as lost
+WORLD_AND_ATTACHED = 16 | 4  # bits of moveit_msgs/PlanningSceneComponents
+AHEAD = 0.6  # distance of a new box in front of the root link in [m]
+ANSWER_TIME = 2.0  # service timeout in [s]
 NO_OBJECT = 'none'
 COLOR, ATTACHED_COLOR = (73, 80, 87), (12, 133, 153)
 OPACITY = 0.6
-GIZMO_SIZE = 0.2  # of the arrows by which an object is dragged in [m]
+GIZMO_SIZE = 0.2  # of an object's drag handles in [m]
 BOX_SIZE = (0.2, 0.2, 0.2)  # of a new box in [m]
 
 
 Ordered = Callable[[Callable[..., object]], Callable[..., None]]
-"""Returns what has something done in the thread of the node, as long as this robot is shown."""
+"""Wraps a function to run in the node's thread, while this robot is shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """Something that a robot may not touch, or holds."""
+    """An obstacle, or an object attached to the robot."""
 
-    message: Message  # as a moveit_msgs/CollisionObject
-    attached: bool = False  # the robot holds it
+    message: Message  # a moveit_msgs/CollisionObject
+    attached: bool = False  # to the robot
 
     @property
     def pose(self) -> Transform:
-        """Where it is in its frame."""
+        """Pose of the object in :attr:`frame`."""
         return transform_of(self.message.pose)
 
     @property
     def frame(self) -> str:
-        """The frame in which it is."""
+        """Frame id of the object."""
         return str(self.message.header.frame_id)
 
 
 class PlanningScene:
-    """What move_group has in its scene; everything in the thread of the node."""
+    """Shows and changes move_group's planning scene. Call in the node's thread."""
 
     def __init__(self, node: Node, page: RobotPage, ordered: Ordered, say: Report) -> None:
         self._node, self._page, self._ordered, self._say = node, page, ordered, say
         self._apply: Client | None = None
         self._whole: Client | None = None
-        self._robot: RobotScene | None = None  # on which it is shown
+        self._robot: RobotScene | None = None  # the robot beside which the scene is shown
         self._objects: dict[str, SceneObject] = {}
         self._drawn: dict[str, tuple[SceneObject, FrameHandle]] = {}
         self._count = 0
         self._name = NO_OBJECT
-        self._grips = False  # the object is being dragged
-        self._asked = -math.inf  # when the whole scene was requested, as long as it is awaited
-        self._stale = False  # it was not shown since it has changed
+        self._grips = False  # whether an object is being dragged
+        self._asked = -math.inf  # time of the pending request for the whole scene
+        self._stale = False  # changed since it was last shown
         self._seen = True
         self.gizmo: TransformControlsHandle | None = None
 
     def connect(self) -> None:
-        """Subscribe to the scene of a move_group."""
+        """Connect to a move_group: create its service clients, and subscribe to its scene."""
         services = import_module('moveit_msgs.srv')
         scene = import_module('moveit_msgs.msg').PlanningScene
         node = self._node
@@ -95,7 +95,7 @@ class PlanningScene:
         node.create_subscription(scene, 'monitored_planning_scene', self._take, LATCHED)
 
     def offer(self, robot: RobotScene) -> None:
-        """Show the scene beside a robot, and offer to change it."""
+        """Show the scene beside a robot, and add the controls that change it."""
         self._robot, self._seen = robot, True
         gui, do = self._page.server.gui, self._ordered
         self.chosen: GuiDropdownHandle[str] = add_choice(
@@ -118,7 +118,7 @@ class PlanningScene:
             frame.visible = seen
 
     def remove(self) -> None:
-        """Show it no more."""
+        """Hide the scene, and remove the drag handles."""
         self._draw({})
         self._robot = None
         if self.gizmo is not None:
@@ -126,12 +126,12 @@ class PlanningScene:
             self.gizmo = None
 
     def choose(self, name: str) -> None:
-        """Choose an object, to be dragged or removed."""
+        """Select an object to drag or remove."""
         self._name, self._grips = name, False
         self._show()
 
     def _take(self, message: Message) -> None:
-        """Request the whole scene when objects change: the topic may carry the change only."""
+        """Request the whole scene when objects change: the message may be only a diff."""
         held = message.robot_state.attached_collision_objects
         whole = not (message.is_diff and message.robot_state.is_diff)
         if whole or held or message.world.collision_objects:
@@ -139,7 +139,7 @@ class PlanningScene:
             self.look()
 
     def look(self) -> None:
-        """Request the whole scene where it has changed; one request at a time."""
+        """Request the whole scene if it has changed; one request at a time."""
         now = time.monotonic()
         if not self._stale or self._whole is None or now - self._asked < ANSWER_TIME:
             return
@@ -188,7 +188,7 @@ class PlanningScene:
         put(self.gizmo, thing.pose)
 
     def _draw(self, objects: Mapping[str, SceneObject]) -> None:
-        """Draw these objects, and no others; leave what has not changed as it is."""
+        """Draw exactly these objects; keep unchanged ones."""
         if self._robot is None:
             return
         for name in self._drawn.keys() - objects.keys():
@@ -197,10 +197,10 @@ class PlanningScene:
             if name in self._drawn:
                 before, frame = self._drawn[name]
                 if before == each:
-                    put(frame, each.pose)  # it may have been dragged, in vain
+                    put(frame, each.pose)  # undo a drag that was refused
                     continue
                 frame.remove()
-            self._count += 1  # names of objects may have what paths of nodes may not
+            self._count += 1  # object names may contain characters that node paths may not
             path = f'{self._robot.path_of(each.frame)}/object{self._count}'
             frame = draw_object(self._page.server.scene, path, each)
             frame.visible = self._seen
@@ -215,7 +215,7 @@ class PlanningScene:
     # -- what people do
 
     def drag(self, pose: Transform, *, is_last: bool) -> None:
-        """Move the object that is chosen; the last of several says so."""
+        """Move the selected object; ``is_last`` marks the end of a drag."""
         thing = self._objects.get(self._name)
         if thing is None:
             return
@@ -228,18 +228,18 @@ class PlanningScene:
             self._change(change, f'{self._name} is moved')
 
     def add_box(self, size: tuple[float, float, float]) -> None:
-        """Add a box of a size in [m]."""
+        """Add a box with edges ``size`` in [m]."""
         if self._robot is None:
             return
         number = 1
         while f'box{number}' in self._objects:
             number += 1
-        self._name = name = f'box{number}'  # to be dragged as soon as it is there
+        self._name = name = f'box{number}'  # selected for dragging once it exists
         place = Transform((AHEAD, 0.0, size[2] / 2.0))
         self._change(box_message(name, size, place, self._robot.tree.root), f'{name} is added')
 
     def remove_chosen(self) -> None:
-        """Remove the object that is chosen."""
+        """Remove the selected object."""
         thing = self._objects.get(self._name)
         if thing is not None:
             what, self._name = f'{self._name} is removed', NO_OBJECT
@@ -264,12 +264,12 @@ class PlanningScene:
             self._say(what, failed=False)
 
     def _refused(self, reason: str) -> None:
-        self._show()  # where it still is
+        self._show()  # at its unchanged pose
         self._say(reason, failed=True)
 
 
 def draw_object(scene: SceneApi, path: str, thing: SceneObject) -> FrameHandle:
-    """Draw a moveit_msgs/CollisionObject; shapes that are none are left out."""
+    """Draw a moveit_msgs/CollisionObject; invalid shapes are left out."""
     frame = scene.add_frame(path, show_axes=False)
     put(frame, thing.pose)
     color = ATTACHED_COLOR if thing.attached else COLOR
@@ -301,10 +301,10 @@ def _draw_shape(
         case shape.CYLINDER, (height, radius):
             return scene.add_cylinder(path, radius, height, color, opacity=OPACITY)
         case shape.CONE, (height, radius):
-            from trimesh.creation import cone as cone_of  # a third of the start of a page
+            from trimesh.creation import cone as cone_of  # slow: a third of a page's start
 
             cone = cone_of(radius, height)
-            vertices = np.asarray(cone.vertices) - (0.0, 0.0, height / 2.0)  # as MoveIt has it
+            vertices = np.asarray(cone.vertices) - (0.0, 0.0, height / 2.0)  # MoveIt's origin
             faces = np.asarray(cone.faces)
             return scene.add_mesh_simple(path, vertices, faces, color=color, opacity=OPACITY)
     return None

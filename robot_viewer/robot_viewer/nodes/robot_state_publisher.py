@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer robot_state_publisher``: /joint_states and a URDF become /tf."""
+"""``ros2 run robot_viewer robot_state_publisher``: computes /tf from /joint_states and a URDF."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ NAME = 'robot_state_publisher'
 DESCRIPTION = 'robot_description'
 DEFAULTS = Settings()
 TF_DEPTH = 100
-"""Queue of /tf, as tf2_ros has it."""
+"""Queue depth of /tf, as in tf2_ros."""
 
 
 class RobotStatePublisher(Node):
@@ -52,7 +52,7 @@ class RobotStatePublisher(Node):
 
     @destroyed_when_refused
     def __init__(self, description: str = '') -> None:
-        """Publish what does not move, and subscribe.
+        """Publish fixed transforms, and subscribe to joint states.
 
         Raises:
             ParameterError: A parameter is wrong, or there is no description.
@@ -116,7 +116,7 @@ class RobotStatePublisher(Node):
         )
 
     def _check(self, parameters: Iterable[Parameter]) -> SetParametersResult:
-        """Refuse a description that cannot be used; ranges are rclpy's to check."""
+        """Reject an unusable description; rclpy checks the ranges."""
         for parameter in parameters:
             if parameter.name == DESCRIPTION:
                 try:
@@ -165,7 +165,7 @@ def _stamped(named: FrameTransform, stamp: object) -> TransformStamped:
 
 
 def _read_argument(argv: Sequence[str]) -> str:
-    """Read the URDF file that the command line names, if it does."""
+    """Read the URDF file named on the command line, if any."""
     files = remove_ros_args(list(argv))[1:]
     if not files:
         return ''
@@ -173,7 +173,7 @@ def _read_argument(argv: Sequence[str]) -> str:
         raise ParameterError(f'one URDF file at most, not {" ".join(files)}')
     try:
         text = Path(files[0]).read_text(encoding='utf-8')
-        read_urdf(text)  # here, where it has a name
+        read_urdf(text)  # here, where the file name is known
     except (OSError, UnicodeDecodeError, DescriptionError) as error:
         raise DescriptionError(f'{files[0]}: {error}') from error
     return text
@@ -186,5 +186,5 @@ def _start() -> RobotStatePublisher:
 
 
 def main() -> int:
-    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
+    """Run until Ctrl-C; return 0, or 1 if it could not start."""
     return run_node(NAME, _start, DescriptionError)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""May the robot be moved? From its topics, for the page, /diagnostics and a terminal.
+"""May the robot be moved? Answered from its topics, for the page, /diagnostics and a terminal.
 
-:class:`Watch` keeps what was last seen of a robot, :class:`Judge` finds out its state for a page
-and does the one action that it wants, and ``ros2 run robot_viewer state`` prints it in one line.
+:class:`Watch` stores a robot's latest messages, :class:`Judge` determines its state for a page
+and runs the suggested action, and ``ros2 run robot_viewer state`` prints it in one line.
 """
 
 from __future__ import annotations
@@ -46,22 +46,22 @@ from .interfaces import TRIGGER, TriggerCalls
 if TYPE_CHECKING:
     from ..page.robot_page import Overlay, RobotPage
 
-STATUS_AGE = 5.0  # time in [s] after which a status that does not come again is unknown
+STATUS_AGE = 5.0  # age in [s] above which a status counts as unknown
 STATUS_SILENCE = 3.5
-"""Time in [s] without any status after which a robot is out of reach, where no one listens to its
-joint states."""
-MOVES = 0.01  # velocity of a joint in [rad/s] or [m/s] above which it moves
-STILL_AFTER = 0.3  # time in [s] after which a joint that was not seen to move again stands
-OWN = ': robot'  # end of the name of the status that a page publishes of its robot
+"""Time in [s] without any status after which a robot is out of reach, if its joint states are not
+subscribed."""
+MOVES = 0.01  # joint velocity in [rad/s] or [m/s] above which it moves
+STILL_AFTER = 0.3  # time in [s] without motion after which a joint stands still
+OWN = ': robot'  # name suffix of the robot status that a page publishes
 
 
 class Watch:
-    """Takes joint states and diagnostics.
+    """Stores joint states and diagnostics.
 
     Attributes:
-        statuses: The last of each name.
-        answer: The status that a page publishes of this robot; None before one.
-        joints_at: When the last joint states came; None before them.
+        statuses: The latest status by name.
+        answer: The robot status that a page publishes; None before the first.
+        joints_at: Steady time of the last joint states in [s]; None before the first.
     """
 
     def __init__(self) -> None:
@@ -69,28 +69,28 @@ class Watch:
         self.answer: Status | None = None
         self._times: dict[str, float] = {}
         self.joints_at: float | None = None
-        self._since: float | None = None  # when it began to listen to joint states
+        self._since: float | None = None  # when the subscription to joint states began
         self._moved_at = -math.inf
 
     def forget(self) -> None:
-        """Forget the statuses: they are old, or those of another robot."""
+        """Discard the statuses because they are old or another robot's."""
         self.statuses.clear()
         self._times.clear()
 
     def listen(self, *, begins: bool) -> None:
-        """Record that joint states are listened to from now on, or no more."""
+        """Record the start or end of the subscription to joint states."""
         self._since, self.joints_at = time.monotonic() if begins else None, None
 
     def take_joints(self, message: JointState) -> None:
-        """Record a message of the robot."""
+        """Record joint states of the robot."""
         self.joints_at = time.monotonic()
         if any(abs(velocity) > MOVES for velocity in message.velocity):
             self._moved_at = self.joints_at
 
     def take_statuses(self, message: DiagnosticArray) -> None:
-        """Record a message of any node of the robot."""
+        """Record diagnostics from any node of the robot."""
         for status in message.status:
-            level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
+            level = min(status.level[0], STALE)  # levels unknown to diagnostic_msgs are stale
             values = {each.key: each.value for each in status.values}
             kept = Status(status.name, level, status.message, values)
             if status.name.endswith(OWN):
@@ -101,11 +101,11 @@ class Watch:
 
     @property
     def legs(self) -> list[Status]:
-        """What the controller of a walking robot says."""
+        """Statuses of a walking robot's controller."""
         return legs_of(self.statuses.values())
 
     def aged(self, now: float) -> list[Status]:
-        """Return the statuses as they are known now; one that does not come again is unknown."""
+        """Return all statuses; overdue ones become stale."""
         found = []
         for name, status in self.statuses.items():
             age = now - self._times[name]
@@ -116,21 +116,21 @@ class Watch:
         return found
 
     def silence(self, now: float, *, publishes: bool) -> float:
-        """Return the time in [s] since the last message of the robot; 0 where it sends none."""
+        """Return the time in [s] since the robot's last message; 0 if it sends none."""
         if publishes and self._since is not None:
             return now - (self.joints_at or self._since)
         last = max(self._times.values(), default=now)
         return now - last if now - last > STATUS_SILENCE else 0.0
 
     def moves(self, since: float = -math.inf) -> bool:
-        """Whether the robot moves: a walking one follows a velocity, of others a joint moves."""
+        """Whether a walking robot follows a velocity, or a joint of another robot moves."""
         legs = self.legs
-        if legs:  # they move while it stands, too
+        if legs:  # its joints also move while it stands
             return any(walks(each) and self._times[each.name] > since for each in legs)
         return self._moved_at > max(since, time.monotonic() - STILL_AFTER)
 
     def seen(self, robot: str, services: Iterable[str], *, publishes: bool) -> Seen:
-        """Return what is known now of a robot, by its name and its Trigger services."""
+        """Return a snapshot of a robot from its name, Trigger services and messages."""
         now = time.monotonic()
         return Seen(
             robot=robot,
@@ -142,19 +142,19 @@ class Watch:
 
 
 REPORT_PERIOD = 1.0
-"""Time between two statuses of the robot on /diagnostics in [s], where it does not change."""
+"""Period of an unchanged robot status on /diagnostics in [s]."""
 PUSH_PERIOD = 0.5
-"""The same of what is shown on pages that are open: without it they have lost their server."""
+"""Period of unchanged states sent to open pages in [s]; a page detects a lost server by it."""
 SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
-"""Types of services that only a simulation offers."""
+"""Service types that only a simulation offers."""
 STAGES = {None: 'braking', True: 'stopped', False: 'failed'}
-"""How far a STOP has come, by whether the robot has confirmed that it stands."""
+"""Stage of a STOP, by whether the robot confirmed standstill."""
 BEGIN_TIME, COAST_TIME = 0.5, 3.0
-"""Times in [s] after the page has driven: in which a motion of it may begin, and come to rest."""
+"""Times in [s] after a command of the page within which its motion may begin, and come to rest."""
 
 
 class Judge:
-    """Finds out whether the robot may be moved; everything in the thread of the node."""
+    """Determines whether the robot may be moved. Call in the node's thread."""
 
     def __init__(self, node: Node, page: RobotPage, watch: Watch, calls: TriggerCalls) -> None:
         self._node, self._page, self._watch, self._calls = node, page, watch, calls
@@ -162,9 +162,9 @@ class Judge:
         self._simulated = False
         self._services: frozenset[str] = frozenset()
         self._stop: Stop | None = None
-        self._stood_at = math.inf  # when the robot has confirmed that
-        self._drove_at = -math.inf  # when the page moved it, as long as that motion goes on
-        self._acting = ''  # the action that runs, and the services that it has called
+        self._stood_at = math.inf  # when the robot confirmed standstill
+        self._drove_at = -math.inf  # when the page last moved it; -inf after that motion
+        self._acting = ''  # the running action, and the services that it called
         self._group: tuple[str, ...] = ()
         self._state = RobotState('', Level.UNKNOWN, '')
         self._reported_at = self._pushed_at = 0.0
@@ -175,7 +175,7 @@ class Judge:
     def look(self, services: Mapping[str, Iterable[str]]) -> None:
         """Record the services of the robot, by name and types.
 
-        An action whose services have gone is over: their answer may never come.
+        This ends an action whose services are gone: they may never answer.
         """
         self._services = frozenset(name for name, kinds in services.items() if TRIGGER in kinds)
         self._simulated = any(kind in SIMULATIONS for each in services.values() for kind in each)
@@ -193,9 +193,9 @@ class Judge:
         drives: str,
         controllers: Iterable[str],
     ) -> None:
-        """Find out how the robot is; show it, and report it.
+        """Determine the state of the robot, show it, and publish it.
 
-        ``limit`` are the words of the servo, ``drives`` what of the page moves it, in words.
+        ``limit`` is the servo's text; ``drives`` describes what moves the robot from the page.
         """
         now, live = time.monotonic(), self._page.live
         seen = self._watch.seen(self.robot, self._services, publishes=publishes)
@@ -255,19 +255,19 @@ class Judge:
         self._publisher.publish(message)
 
     def stop(self, answer: Future[Stop], order: Callable[[Callable[[], None]], None]) -> None:
-        """Record a STOP, and what the robot answers to it."""
-        self._page.live.stop()  # what was allowed just before does not count
+        """Record a STOP now, and the robot's answer once it arrives."""
+        self._page.live.stop()  # revokes a permission given just before
         self._acting, self._group = '', ()
         self._stop = stop = Stop()
         answer.add_done_callback(lambda done: order(partial(self._has_stopped, stop, done)))
 
     def _has_stopped(self, stop: Stop, answer: Future[Stop]) -> None:
-        if self._stop is stop:  # the last one counts, and none that was allowed after
+        if self._stop is stop:  # only the last STOP counts, unless motion was allowed again
             self._stop = answer.result()
             self._stood_at = time.monotonic()
 
     def act(self, action: str) -> None:
-        """Do the action that is wanted now, if it is still this one."""
+        """Run the suggested action, if it is still this one."""
         state = self._state
         if action != state.action:
             self._page.say(f'{action}: the state is another one now', failed=True)
@@ -280,7 +280,7 @@ class Judge:
             self._call(action, [group for group in state.calls if group])
 
     def _call(self, action: str, groups: list[tuple[str, ...]]) -> None:
-        """Call the next group of services, while each before succeeds and no STOP comes."""
+        """Call the groups of services in turn, until one fails or a STOP arrives."""
         self._group = group = groups[0] if groups else ()
         if not group:
             self._acting = ''
@@ -295,7 +295,7 @@ class Judge:
 
 NAME = 'state'
 LOOK_TIME, ANSWER_TIME = 3.0, 1.5
-"""Longest time in [s] to look at a robot, and to wait for what its page says."""
+"""Longest times in [s]: for the whole check, and to wait for the page's status."""
 HELP = """\
 Prints in one line whether a robot may be moved: a word, the reason, and what to do. Where its page
 runs it is the line of the page; else it is computed from what the robot sends meanwhile.
@@ -308,7 +308,7 @@ or no robot
 
 
 class StateNode(Node):
-    """Looks at a robot for a moment."""
+    """Observes a robot briefly to print its state."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
@@ -325,7 +325,7 @@ class StateNode(Node):
 
     @property
     def state(self) -> RobotState:
-        """What the page says of the robot, or else what is seen of it."""
+        """State published by the page, else computed from the robot's messages."""
         page = self._watch.answer
         if page is None:
             services = (name for name, _ in self.get_service_names_and_types())
@@ -335,13 +335,13 @@ class StateNode(Node):
         return RobotState(word, Level(values.get('color', 'unknown')), sentence)
 
     def known(self, elapsed: float) -> bool:
-        """Whether nothing more is waited for, after a time in [s]."""
+        """Whether the state is known after ``elapsed`` [s]."""
         seen = bool(self._robot and self._watch.statuses and self._watch.joints_at is not None)
         return self._watch.answer is not None or (seen and elapsed > ANSWER_TIME)
 
 
 def main() -> int:
-    """Print the state; return 0 where the robot may be moved."""
+    """Print the state; return its exit code, 0 if the robot may be moved."""
     return run_program(NAME, _look, help_text=HELP)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer web_viewer``: a page on which the robot is seen and moved."""
+"""``ros2 run robot_viewer web_viewer``: web page that shows and moves the robot."""
 
 from __future__ import annotations
 
@@ -66,33 +66,33 @@ from .state import Judge, Watch
 NAME = 'web_viewer'
 PORT = 8080
 DRAW_PERIOD = 1.0 / 30.0
-"""Time between two pictures, and between two looks at what was done on the page, in [s]."""
-LIST_PERIOD = 0.2  # time between two looks at numbers in [s]
-PLOT_PERIOD = 0.5  # time between two drawings of curves in [s]
+"""Time in [s] between two drawn frames, and between two reads of user input."""
+LIST_PERIOD = 0.2  # time between two updates of numbers in [s]
+PLOT_PERIOD = 0.5  # time between two updates of plots in [s]
 REST_TIME, REST_TICKS = 1.0, 3
-"""Time in [s] without a motion after which every third picture is enough."""
-SEEN = 1e-4  # least motion of a joint that is drawn in [rad] or [m]: what stands is noisy
-LIMIT_AGE = 1.0  # time in [s] for which a limit that the servo names is shown
+"""Time in [s] without motion after which only every third frame is drawn."""
+SEEN = 1e-4  # least joint motion that is drawn in [rad] or [m]: above noise at rest
+LIMIT_AGE = 1.0  # time in [s] for which a servo's limit text is shown
 SCALES = ('command_in_type', 'scale.linear', 'override_velocity_scaling_factor')
-"""Parameters of a servo that say how fast the tool is at a share of its speed."""
-MIN_OVERRIDE = 0.01  # an override of the velocity below this is none, as in moveit_servo
+"""Servo parameters that determine the tool speed for a speed fraction."""
+MIN_OVERRIDE = 0.01  # a smaller velocity override is ignored, as in moveit_servo
 SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
-GRAPH_PERIOD = 1.0  # time between two looks at the nodes there are in [s]
+GRAPH_PERIOD = 1.0  # time between two scans of the ROS graph in [s]
 SETTLED, SELDOM = 10, 3
-"""After that many looks at the same nodes, what they offer is looked at with each third one."""
+"""After so many scans with the same nodes, only every third one lists their services."""
 DRIVE_SERVICES = (DISABLE, *(verb for group in DRIVE_GROUPS.values() for verb in group.values()))
-"""Services of a drive that the page offers; a node with halt and quick_stop is one."""
+"""Drive services on the page; a node with halt and quick_stop is a drive."""
 WARN = 30  # level of warnings in rcl_interfaces/Log
 ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""It gets what was said in the seconds before the page was opened."""
-STOP = 'stop'  # service of a robot that stops all of it
+"""QoS that also receives log messages from the seconds before the page was opened."""
+STOP = 'stop'  # service that stops the whole robot
 
 
 class WebViewer(Node):
-    """Shows what the topics say, and asks for what people do on the page.
+    """Shows the robot's topics on a page, and sends the user's commands.
 
-    Callbacks of the page come in its threads. What they ask for is left for the node's thread, but
-    for the heartbeats of held buttons, which are published at once.
+    Callbacks of the page run in its threads. They queue requests for the node's thread, except
+    heartbeats of held buttons, which they publish immediately.
     """
 
     @destroyed_when_refused
@@ -110,7 +110,7 @@ class WebViewer(Node):
         port = read.whole('port', PORT, (1, 65535), 'of the page; else the next free one')
         self._prefix = read.text('frame_prefix', '', 'before each frame, as of the robot on /tf')
         refuse_misspelt(self)
-        if problem := binding_problem(host):  # the server would look for a free port without end
+        if problem := binding_problem(host):  # the server would search for a free port forever
             raise ParameterError(
                 f'host is {host!r}: {problem}; give an address of this computer, such as'
                 ' 127.0.0.1, or 0.0.0.0 for all of them'
@@ -121,12 +121,12 @@ class WebViewer(Node):
         self._triggers = TriggerCalls(self, self._report)
         self._drives: dict[str, list[str]] = {}
         self._stops: set[str] = set()
-        self._own_stops: set[str] = set()  # of them those that a robot was seen to offer
+        self._own_stops: set[str] = set()  # the subset seen to be a robot's own
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
         self._watch = Watch()
         self._robot_publishes = False
-        self._limit = ('', 0.0)  # in words of the servo, and when
+        self._limit = ('', 0.0)  # servo text, and its time
         self._servo_listens = False
         self._servo: Client | None = None
         self._set_mode: Client | None = None
@@ -134,7 +134,7 @@ class WebViewer(Node):
         self._independent: Sequence[str] = ()
         self._listening = Listening(self)
         self._base = self._shown_base = Transform()
-        self._root, self._looks = '', 0  # at the same nodes
+        self._root, self._looks = '', 0  # scans with the same nodes
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
@@ -178,7 +178,7 @@ class WebViewer(Node):
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """Those that an executor serves; the others are read when the page is drawn."""
+        """Subscriptions served by the executor; the others are read when the page is drawn."""
         group = self._listening.group
         yield from (each for each in super().subscriptions if each.callback_group is not group)
 
@@ -210,7 +210,7 @@ class WebViewer(Node):
         return self._root, frames_of(data)
 
     def _take_transforms(self, message: TFMessage) -> bool:
-        """Move the root; return whether a message with these frames says nothing of it."""
+        """Move the root link; return whether these frames do not contain it."""
         for transform in message.transforms:
             if transform.child_frame_id == f'{self._prefix}{self._root}':
                 place, turn = transform.transform.translation, transform.transform.rotation
@@ -225,7 +225,7 @@ class WebViewer(Node):
             self._limit = message.message, time.monotonic()
 
     def _take_log(self, message: Log) -> None:
-        """Keep the warnings and errors of other nodes of the robot."""
+        """Store warnings and errors of the robot's other nodes."""
         who = message.name.replace('.', '/')  # a logger has the full name of its node
         within = self.get_namespace().strip('/')
         inside = not within or who.startswith(f'{within}/')
@@ -240,7 +240,7 @@ class WebViewer(Node):
                 self._orders.popleft()()
 
     def _rests(self) -> bool:
-        """Whether nothing moves, on the page neither, and no button is held."""
+        """Whether robot and page are at rest, and no button is held."""
         parts = self._controllers.busy, self._first_motion.busy, self._planning.moves
         held = any(parts) or self.page.live.held
         return not held and time.monotonic() - self._moved_at > REST_TIME
@@ -263,7 +263,7 @@ class WebViewer(Node):
             self._listening.update(time.monotonic(), looked_at=looked_at),
         )
         if begins or was != self._listening.active:
-            self._watch.listen(begins=begins)  # what is known is old
+            self._watch.listen(begins=begins)  # stored messages are old
         if watched:
             self._draw()
 
@@ -315,7 +315,7 @@ class WebViewer(Node):
         self._looks = self._looks + 1 if nodes == self._nodes else 0
         self._nodes = nodes
         if self._looks > SETTLED and self._looks % SELDOM:
-            return  # to list all services is a quarter of the load of a page at rest
+            return  # listing all services is a quarter of an idle page's load
         services = dict(self.get_service_names_and_types())
         description = self.resolve_topic_name('robot_description')
         looks: Mapping[str, Callable[[], None]] = {
@@ -339,11 +339,11 @@ class WebViewer(Node):
         for without, look in looks.items():
             with self.border.around(without):
                 look()
-        # also while a link is cut, or when it has ended
+        # stays set if the connection is cut or the publisher ends
         self._robot_publishes |= bool(self.count_publishers('joint_states'))
 
     def _of_this_robot(self, services: Mapping[str, list[str]]) -> dict[str, list[str]]:
-        """Return the services of nodes of the robot of this page, and of no other one."""
+        """Return the services of this page's robot only."""
         topics = (name for name, _ in self.get_topic_names_and_types())
         nodes = {name.rpartition('/')[0] for name in services}
         own = set(of_robot(self.resolve_topic_name('robot_description'), topics, nodes))
@@ -366,7 +366,7 @@ class WebViewer(Node):
         with self.border.around('who offers STOP is not known'):
             self._doubtful_stops(self._stops - self._own_stops)
         for service in (*self._stops, *(f'{drive}/halt' for drive in self._drives)):
-            self._triggers.client(service)  # it needs time to find its server; a STOP has none
+            self._triggers.client(service)  # early: discovery takes time that a STOP does not have
         self.page.offer_drives(self._drives)
 
     def _find_jogging(self) -> None:
@@ -379,7 +379,7 @@ class WebViewer(Node):
             self._servo.call_async(request).add_done_callback(self._take_scales)
 
     def _take_scales(self, future: Future) -> None:
-        """Show how fast the tool is; of a servo that names no scales that is unknown."""
+        """Show the tool speed; unknown if the servo has no scale parameters."""
         values = [] if future.exception() is not None else future.result().values
         if len(values) == len(SCALES) and values[1].double_value > 0.0:
             units, scale = values[0].string_value, values[1].double_value
@@ -430,7 +430,7 @@ class WebViewer(Node):
         return answer
 
     def _jog(self, twist: Twist, frame: str) -> None:
-        """Publish a jog once, at once; the robot's time-out ends it."""
+        """Publish a jog command once, immediately; the robot's time-out ends the motion."""
         if self._jogs is None:
             return
         message = TwistStamped()
@@ -476,10 +476,10 @@ class WebViewer(Node):
         for part in (self._controllers, self._grippers, self._first_motion, self._planning):
             with self.border.around('STOP'):
                 part.stop()
-        called = self._stops - answers.keys()  # the others are not there
+        called = self._stops - answers.keys()  # the others are unavailable
         try:
             doubtful = self._doubtful_stops(called)
-        except Exception as error:  # noqa: BLE001  # whatever it is, the drives are halted
+        except Exception as error:  # noqa: BLE001  # halt the drives after any error
             self.get_logger().error(f'STOP: {type(error).__name__}: {error}')
             doubtful = {service: [] for service in called}
         halts = {
@@ -502,21 +502,21 @@ class WebViewer(Node):
         answer.set_result(Stop(stands=False, text=text))
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
-        """Return those that are not a robot's own alone, with the other nodes that offer them.
+        """Return the services not offered by a robot's own node alone, with the other nodes.
 
-        What was a robot's own stays so while the graph shows no other node that offers it: after
-        a stall that is longer than its lease, it shows the services of a node without the node.
+        A robot's own service stays its own while no other node offers it: after a stall beyond
+        the discovery lease, the graph shows the services of a node without the node.
         """
         others = {service: list[str]() for service in services}
         if not others:
             return {}
         for name, namespace in self.get_node_names_and_namespaces():
             node = f'{namespace.rstrip("/")}/{name}'
-            with suppress(NodeNameNonExistentError):  # it has just gone
+            with suppress(NodeNameNonExistentError):  # the node just left
                 offered = dict(self.get_service_names_and_types_by_node(name, namespace))
                 for service in offered.keys() & others.keys():
                     if TRIGGER not in offered[service]:
-                        continue  # it is not asked
+                        continue  # it is not called
                     if stops_robot(node, offered):
                         self._own_stops.add(service)
                     else:
@@ -536,7 +536,7 @@ class WebViewer(Node):
 
     def _report(self, text: str, *, failed: bool) -> None:
         self.page.say(text, failed=failed)
-        # a line of its own for each severity: rclpy refuses another one from the same line
+        # separate lines: rclpy rejects different severities from one line
         if failed:
             self.get_logger().warning(text)
         else:
@@ -548,21 +548,21 @@ def _conclude(
     answers: Mapping[str, tuple[bool, str]],
     counted: Collection[str],
 ) -> None:
-    """Answer a STOP when each service that counts has succeeded, or with one that has not."""
+    """Set the result of a STOP once all counted services succeeded, or one failed."""
     known = {name: answers[name] for name in answers if name in counted}
     failed = [f'{name}: {text}' for name, (ok, text) in known.items() if not ok]
-    if not answer.done() and (failed or len(known) == len(counted) > 0):  # or none waits any more
+    if not answer.done() and (failed or len(known) == len(counted) > 0):  # else it is answered
         text = failed[0] if failed else '. '.join(text for _, text in known.values())
         answer.set_result(Stop(stands=not failed, text=text))
 
 
 def _stop_beside(node: str) -> str:
-    """Return the service that stops all of the robot in whose namespace a node is."""
+    """Return the stop service of the robot in whose namespace a node is."""
     return f'{node.rpartition("/")[0]}/{STOP}'
 
 
 def main() -> int:
-    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
+    """Run until Ctrl-C; return 0, or 1 if it could not start."""
     return run_program(NAME, _serve)
 
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page on which a robot is seen and moved; nothing in here knows ROS.
+"""The page that shows and moves a robot; independent of ROS.
 
-Conventions: positions of joints are in [rad] or [m] by name, places in the root link in [m], times
-on the steady clock in [s]; None hides what is shown, or says that it is unknown. What people do is
-reported in threads of the server.
+Conventions: joint positions are in [rad] or [m] by name, points in the root link in [m], times on
+the steady clock in [s]; None hides an element or means unknown. Callbacks for user input run in
+threads of the server.
 """

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A first motion on the page: targets while a button is held, and the words that are shown.
+"""First motion of a joint: targets while a button is held, and the texts on the page.
 
-Positions in [rad] or [m], times on one steady clock in [s]. The library first_motion guards,
-concludes and corrects; a drive is commanded as by any client, by a stream of targets that the
-robot itself stops when it pauses.
+Positions in [rad] or [m], times on one steady clock in [s]. The library first_motion guards
+the motion, judges it and computes corrections. The page streams targets to the drive, as any
+client; the robot stops by itself when the stream pauses.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from first_motion import (
 
 from ..robot_state import ENABLED
 
-RELEASED_AFTER = 0.15  # time in [s] without a heartbeat after which the button counts as let go
+RELEASED_AFTER = 0.15  # time in [s] without heartbeat after which a button counts as released
 MAX_STEP_TIME = 0.1
-"""Longest time in [s] for which one heartbeat moves the target on: one that is late moves it no
-farther."""
-FRESHNESS = 0.5  # age in [s] from which a position is too old to go on
+"""Longest time in [s] by which one heartbeat advances the target, however late the heartbeat
+is."""
+FRESHNESS = 0.5  # age in [s] from which a position is too old to continue
 NO_POSITION = 'its position does not arrive on joint_states'
 MODES = frozenset({'Cyclic position', 'Interpolated position'})
-"""Modes in which targets are positions, and the master halts the axis when they pause."""
+"""Modes with position targets in which the master halts the axis when they pause."""
 LEAD_TIME = 0.3
-"""Time in [s] by which the target is ahead of the joint at most, at the speed of the motion."""
+"""Maximum lead of the target over the joint, as a time in [s] at the motion's speed."""
 
 
 class Saw(Enum):
-    """What a person saw; the value is what he chooses."""
+    """What the user saw; the value is the label on the page."""
 
     LIKE_PICTURE = 'it moved like the robot in the picture'
     OTHER_WAY = 'it moved the other way'
@@ -53,7 +53,7 @@ class Saw(Enum):
     OTHER_JOINT = 'another joint moved'
 
     def seen(self, reported: float, distance: float) -> Seen:
-        """Return what that is for the judgement."""
+        """Convert to the observation that first_motion judges."""
         if self in {Saw.NOTHING, Saw.OTHER_JOINT}:
             return Seen(0, other_joint=self is Saw.OTHER_JOINT)
         shown = 1 if reported >= 0.0 else -1
@@ -63,30 +63,30 @@ class Saw(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MotionRequest:
-    """The motion that a person requests."""
+    """The motion that the user requests."""
 
     joint: str
-    distance: float  # how far; negative for the other way
-    speed: float  # how fast, per second
+    distance: float  # in [rad] or [m]; negative for the other direction
+    speed: float  # in [rad/s] or [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """How a joint counts."""
+    """Units and scales of an axis."""
 
-    kind: JointKind  # what it does
+    kind: JointKind  # revolute or prismatic
     scales: AxisScales
-    says: DriveFacts  # what the drive says about its increments
-    where: str  # they are written: the bus.yml, the section, the channel
+    says: DriveFacts  # reported by the drive about its increments
+    where: str  # location of the scales: bus.yml, section, channel
 
 
 def motion_plan(
     request: MotionRequest, axis: Axis, start: float, others: Mapping[str, float]
 ) -> MotionPlan:
-    """Return the motion that was requested.
+    """Return the plan of a requested motion.
 
     Raises:
-        ValueError: A number of it is not finite, or nothing would move.
+        ValueError: A number is not finite, or nothing would move.
     """
     plan = MotionPlan(
         start=start,
@@ -95,36 +95,36 @@ def motion_plan(
         increment=abs(axis.scales.scale_pos_from_dev),
         others={name: each for name, each in others.items() if math.isfinite(each)},
     )
-    # a joint that is stuck is as far behind as the target goes; that is a result, and no error
+    # a stuck joint lags by the maximum lead; that is a result, not an error
     stuck = lead(plan) + plan.noise
     return replace(plan, following_limit=max(FOLLOWING * abs(plan.distance), stuck))
 
 
 def lead(plan: MotionPlan) -> float:
-    """Return how far the target may be ahead of the joint."""
+    """Return the maximum lead of the target over the joint."""
     return plan.speed * LEAD_TIME + plan.noise
 
 
 class GuardedTargets:
-    """Targets of one motion: at most one for each heartbeat, and none without."""
+    """Targets of one motion: at most one per heartbeat, and none without."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
-        """Begin at rest."""
+        """Start at rest."""
         self.guard = MotionGuard(plan, now)
         self._target = plan.start
-        # a button counts as held until it has been silent for a while: heartbeats of one that was
-        # held before are no agreement to this motion
+        # a button counts as held until its heartbeats pause: heartbeats of an earlier press do not
+        # permit this motion
         self._beat = self._since = now
         self._used = -math.inf
 
     @property
     def commanded(self) -> float:
-        """How far it was commanded until now: a motion may be ended before its target."""
+        """Commanded distance so far: a motion may end before its target."""
         return self._target - self.guard.plan.start
 
     @property
     def press_anew(self) -> bool:
-        """Whether the button is held, and has to be let go before it counts."""
+        """Whether the button is held, but must be released before it counts."""
         return self.guard.needs_release and self._beat > self._since
 
     def beat(self, now: float) -> None:
@@ -132,7 +132,7 @@ class GuardedTargets:
         self._beat = now
 
     def release(self) -> None:
-        """The button was let go."""
+        """Process the release of the button."""
         self._beat = -math.inf
 
     def step(self, now: float, sample: Sample) -> float | None:
@@ -142,7 +142,7 @@ class GuardedTargets:
             sample = replace(sample, following_error=self._target - sample.position)
         order = self.guard.step(now, sample, held=held, busy=False)
         if order is Order.GO:
-            # from where it stands, whatever was commanded before; a single touch moves nothing
+            # start from the measured position; a single touch moves nothing
             self._target, self._used = sample.position, self._beat
         if not self.guard.moving or self._beat <= self._used:
             return None
@@ -151,7 +151,7 @@ class GuardedTargets:
         self._used = self._beat
         left = plan.target - self._target
         self._target += math.copysign(min(plan.speed * gap, abs(left)), left)
-        # a joint that is stuck is not wound up: it would jump when it comes free
+        # limit the lead: a stuck joint would jump when it comes free
         limit = sample.position + math.copysign(lead(plan), plan.distance)
         nearest = min if plan.distance > 0.0 else max
         self._target = nearest(self._target, limit)
@@ -175,7 +175,7 @@ def problem_of(drive: Mapping[str, str], age: float) -> str:
 
 
 def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterator[str]:
-    """Yield what will happen, a paragraph each."""
+    """Yield the paragraphs that announce the motion."""
     kind = axis.kind
     unit = 'rad' if kind is JointKind.TURNS else 'm'
     source = 'the factor group' if axis.scales.scale_from_factor_group else 'bus.yml'
@@ -192,14 +192,14 @@ def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterato
 
 
 def corrections(axis: Axis, judgement: Judgement) -> Iterator[Correction]:
-    """Yield what corrects a sign or scale, one for each likely cause."""
+    """Yield corrections of a sign or scale, one per likely cause."""
     if judgement.verdict.wants_change:
         for cause in judgement.causes or (None,):
             yield propose(axis.scales, judgement, cause)
 
 
 def correction_lines(where: str, correction: Correction) -> str:
-    """Return the lines of the file, to be copied."""
+    """Return the corrected lines of the file, for copying."""
     lines = [f'# {where}', f'# {correction.reason}']
     lines += [f'{key}: {yaml_text(value)}' for key, value in correction.values.items()]
     return '\n'.join(lines)

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Who may open the page: this host's own pages, and from elsewhere who has the token; and STOP.
+"""Access control of the page, by origin on this host and by token from others; and STOP.
 
-viser serves all that reach its port, and any page that a browser of this host has open may
-connect to a loopback port. So each request is looked at before viser sees it.
+viser serves every client of its port, and any page open in a browser of this host may connect to
+a loopback port. So this module checks each request before viser handles it.
 
-viser has its controls in a panel, which may be folded, scrolled or busy. STOP goes its own way: a
-request of its own over HTTP, not behind whatever waits in the page's connection.
+viser's panel may be folded, scrolled or busy. STOP therefore does not use it, but a separate HTTP
+request, which does not queue behind other messages of the page.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from .live import Live, LIVE_PATH
 
 LOOPBACK_NAMES = frozenset({'localhost', 'ip6-localhost', 'ip6-loopback'})
 ELSEWHERE = {socket.AF_INET: '192.0.2.1', socket.AF_INET6: '2001:db8::1'}
-"""Addresses for documentation, which are no host: by them the way out is found."""
+"""Documentation addresses without a host: routes to them reveal this host's outward address."""
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is reached from this computer only."""
+    """Whether a host is reachable from this computer only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -55,7 +55,7 @@ def is_loopback(host: str) -> bool:
 
 
 def binding_problem(host: str) -> str:
-    """Return why nothing can be served at a host; empty where it can be."""
+    """Return why a server cannot bind to a host; empty if it can."""
     try:
         family, kind, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind) as server:
@@ -68,9 +68,9 @@ def binding_problem(host: str) -> str:
 
 
 def shown_host(host: str) -> str:
-    """Return the host of a URL by which a browser reaches a server.
+    """Return the host for the URL of a server.
 
-    Of one that is bound to all addresses it is that by which others reach this computer.
+    For a server bound to all addresses, it is this computer's address in the network.
     """
     if host in {'localhost', '127.0.0.1'}:
         return 'localhost'
@@ -87,64 +87,64 @@ def _outward(version: int) -> str:
     family = socket.AF_INET if version == 4 else socket.AF_INET6
     with socket.socket(family, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect((ELSEWHERE[family], 9))  # of a datagram: nothing is sent
+            probe.connect((ELSEWHERE[family], 9))  # UDP: nothing is sent
         except OSError:  # there is no network
             return '127.0.0.1' if version == 4 else '::1'
         return str(probe.getsockname()[0])
 
 
 STOP_PATH = '/stop'
-STOP_HEADER = 'X-Robot-Stop'  # what no page of another site can send without being asked
+STOP_HEADER = 'X-Robot-Stop'  # other sites cannot send it without a CORS preflight
 END = b'</body>'
 ANSWER_TIMEOUT = 30.0
-"""Time in [s] that a request for STOP waits for the robot, which may have a long ramp; the page
-warns long before."""
+"""Time in [s] that a STOP request waits for the robot, whose ramp may be long; the page warns
+long before."""
 NO_ANSWER = 'no answer from the robot: use the emergency stop'
 
 
 def text_response(
     status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None
 ) -> Response:
-    """Make a response of one line."""
+    """Return a one-line plain text response."""
     body = f'{text}\n'.encode()
     own = {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
     return Response(status, status.phrase, Headers({**(headers or {}), **own}), body)
 
 
 COOKIE = 'robot_viewer_token_{}'
-"""By port: a browser sends the cookies of a host to all its ports, and each page has one."""
+"""Cookie name by port: browsers send a host's cookies to all its ports, and each page has one."""
 HTTP_PORT = 80
 KEPT_AS = 'robot_viewer_token'
 
 
 def _is_failure(record: logging.LogRecord) -> bool:
-    """Whether a record is not about a client that speaks no HTTP, or requests no GET."""
+    """Return whether to log a record: not if a client only failed to send an HTTP GET."""
     return not (record.exc_info and isinstance(record.exc_info[1], InvalidMessage))
 
 
-LOGGER = logging.getLogger(__name__)  # what websockets logs, with a traceback each
+LOGGER = logging.getLogger(__name__)  # for websockets, which logs a traceback each time
 LOGGER.addFilter(_is_failure)
 
 
 class Gate:
-    """Looks at each request before viser does, answers STOP, and adds the overlay to the page.
+    """Checks each request before viser does, answers STOP, and adds the overlay to the page.
 
-    On loopback the Host and Origin headers have to name this host: no page of elsewhere, also
-    under a name that was pointed here (DNS rebinding), moves the robot. Beyond it a token is
-    needed, once in the URL and then as a cookie, and Origin has to be the page's own host. The
-    token stays, so that the STOP of a page that is open works when its server was started again.
+    On loopback the Host and Origin headers must name this host, so that no page of another site
+    moves the robot, even by DNS rebinding. Other addresses require a token, first in the URL, then
+    as a cookie, and Origin must be the page's own host. The token is permanent, so that STOP on an
+    open page still works after a restart of its server.
     """
 
     def __init__(self, host: str, stop: Callable[[], Future[Stop]], live: Live) -> None:
-        """Make a token where one is needed; ``stop`` does not wait for the robot."""
+        """Create a token if one is required; ``stop`` must not wait for the robot."""
         self._stop, self._live = stop, live
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
-        self._page = b''  # with the overlay
+        self._page = b''  # viser's page with the overlay
         self.token = '' if is_loopback(host) else _lasting_token()
         self._serving = False
 
     def answer(self, path: str, headers: Headers) -> Response | None:
-        """Return why a request is refused, or what it needs first; None lets it through."""
+        """Return a refusal, or a response that must come first; None accepts the request."""
         hosts = headers.get_all('Host')
         place = urlsplit(f'//{hosts[0]}') if len(hosts) == 1 else None
         if (
@@ -162,7 +162,7 @@ class Gate:
         given = parse_qs(urlsplit(path).query).get('token', [''])
         if not hmac.compare_digest(given[0].encode(), self.token.encode()):
             return _refusal('open the page by the URL that was printed at its start')
-        # Lax: also a link of another site opens the page; its requests carry the cookie no more
+        # Lax: links of other sites may open the page, but their requests carry no cookie
         cookie = f'{name}={self.token}; HttpOnly; SameSite=Lax; Path=/'
         return text_response(HTTPStatus.SEE_OTHER, '', {'Location': '/', 'Set-Cookie': cookie})
 
@@ -178,10 +178,10 @@ class Gate:
 
     @contextmanager
     def before(self) -> Iterator[None]:
-        """Stand before the server that is started in the block.
+        """Install this gate in front of the server that the block starts.
 
         Raises:
-            RuntimeError: None was, or not by websockets: the page would be open to everybody.
+            RuntimeError: No server was started by websockets: the page would be unprotected.
         """
         serve = websocket_server.serve
 
@@ -189,7 +189,7 @@ class Gate:
             self._serving = True
             options['process_request'] = partial(self._process, options.get('process_request'))
             options['logger'] = LOGGER
-            options['open_timeout'] = 2.0 * ANSWER_TIMEOUT  # or it would end before the answer
+            options['open_timeout'] = 2.0 * ANSWER_TIMEOUT  # else it would end before the answer
             return serve(partial(self._connected, serve_viser), *args, **options)
 
         websocket_server.serve = guarded  # type: ignore[assignment, misc]
@@ -219,7 +219,7 @@ class Gate:
     ) -> Response | None:
         answer = self.answer(request.path, request.headers) or await self._answer_stop(request)
         if connection.transport.is_closing():
-            raise CancelledError  # a browser that waits no more; websockets would fail to answer
+            raise CancelledError  # the browser is gone; websockets could not answer
         if answer is not None or next_one is None:
             return answer
         result = next_one(connection, request)
@@ -229,7 +229,7 @@ class Gate:
         return page and self._over(page)
 
     async def _answer_stop(self, request: Request) -> Response | None:
-        """Return what the robot answers to a request for STOP; None for other requests."""
+        """Return the robot's answer to a STOP request; None for other requests."""
         if request.path.partition('?')[0] != STOP_PATH:
             return None
         if STOP_HEADER not in request.headers:
@@ -243,10 +243,10 @@ class Gate:
         return text_response(status, answer.text)
 
     def _over(self, response: Response) -> Response:
-        """Return a response with the overlay in it, if it is the page.
+        """Add the overlay to a response if it is the page.
 
         Raises:
-            RuntimeError: The page has no end; it would be without STOP.
+            RuntimeError: The page has no end tag for the overlay, so it would lack STOP.
         """
         if not response.headers.get('Content-Type', '').startswith('text/html'):
             return response
@@ -259,20 +259,20 @@ class Gate:
             self._page = gzip.compress(before + self._html + end + after)
         body = self._page if packed else gzip.decompress(self._page)
         headers = Headers(response.headers.raw_items())
-        headers['Cache-Control'] = 'no-store'  # a page without STOP may be in a cache
+        headers['Cache-Control'] = 'no-store'  # a cache may hold a page without STOP
         del headers['Content-Length']
         headers['Content-Length'] = str(len(body))
         return Response(response.status_code, response.reason_phrase, headers, body)
 
 
 def _lasting_token() -> str:
-    """Return the token of this user's pages, which is made once; without a home, one for now."""
+    """Return this user's permanent token; without a home directory a temporary one."""
     fresh = secrets.token_urlsafe(24)
     try:
         folder = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
         folder.mkdir(parents=True, exist_ok=True)
         kept = folder / KEPT_AS
-        with NamedTemporaryFile('w', dir=folder) as file:  # only its owner may read it
+        with NamedTemporaryFile('w', dir=folder) as file:  # readable by its owner only
             file.write(fresh)
             file.flush()
             with suppress(FileExistsError):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What drives an arm: its joints, the tool, a target, and grippers; and plots of how it follows.
+"""Controls of an arm (joints, tool, target, grippers) and plots of its tracking.
 
 Positions are in [rad] or [m], times in [s].
 """
@@ -53,43 +53,43 @@ TWISTS: Mapping[str, tuple[str, Twist]] = {
     'Turn Y −': ('c', (0.0, 0.0, 0.0, 0.0, -1.0, 0.0)),
     'Turn Z −': ('v', (0.0, 0.0, 0.0, 0.0, 0.0, -1.0)),
 }
-"""Keys of servo_keyboard_input, and shares of the speed of jogging along and about axes."""
+"""Keys of servo_keyboard_input, and fractions of the jog speed along and about the axes."""
 REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-BASE = 'base'  # the frame that a command has which names none
+BASE = 'base'  # the frame of a command without frame
 
 
 @dataclass(frozen=True, slots=True)
 class Actions:
-    """What a page may have done; any thread may call it, and none of it waits."""
+    """Callbacks for the actions of a page. Thread-safe and non-blocking."""
 
-    stop: Callable[[], Future[Stop]]  # stops whatever moves; the future has the robot's answer
-    act: Callable[[str], None]  # does the action that is wanted now, if it is still this one
+    stop: Callable[[], Future[Stop]]  # stops all motion; the future holds the robot's answer
+    act: Callable[[str], None]  # runs the suggested action, if it is still this one
     call: Callable[[str, Sequence[str]], None]
-    """Calls Trigger services at the same time; what they are for, in words."""
-    walk: Callable[[Velocity], None]  # commands a velocity in [m/s] and [rad/s] once
+    """Calls Trigger services in parallel; the first argument is their label."""
+    walk: Callable[[Velocity], None]  # sends one velocity command in [m/s] and [rad/s]
     set_mode: Callable[[str], None]  # requests a mode of a walking robot
     jog: Callable[[Twist, str], None]
-    """Commands a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
-    jog_joint: Callable[[str, float], None]  # the same for a joint
+    """Sends one jog command: fractions of the jog speed, -1 to 1, along the axes of a frame."""
+    jog_joint: Callable[[str, float], None]  # the same for one joint
     grip: Callable[[str, float], None]  # moves a gripper to a position in [m] or [rad]
     aim: Callable[[Mapping[str, float], float], None]
-    """Moves joints to targets as long as this comes, at a share of their greatest velocity."""
+    """Moves joints to targets while called repeatedly, at a fraction of their maximum velocity."""
     let_go: Callable[[], None]  # stops a motion to targets
 
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """What can be driven."""
+    """What the page can move now."""
 
-    joints: tuple[str, ...] = ()  # single joints that are jogged, from the base on
-    tool: bool = False  # the tool is jogged
-    grippers: tuple[tuple[str, str], ...] = ()  # their joints by the names of their controllers
-    targets: tuple[str, ...] = ()  # joints that a controller brings to a target
+    joints: tuple[str, ...] = ()  # joints that can be jogged, from the base
+    tool: bool = False  # whether the tool can be jogged
+    grippers: tuple[tuple[str, str], ...] = ()  # pairs of controller and joint name
+    targets: tuple[str, ...] = ()  # joints that a controller can move to a target
 
 
 @dataclass(slots=True)
 class _Tab:
-    """A tab, what it offers, and the HTML of its buttons by their numbers."""
+    """A tab, its offered items, and the HTML of its buttons by number."""
 
     handle: GuiTabHandle
     content: GuiFolderHandle | None = None
@@ -98,10 +98,10 @@ class _Tab:
 
 
 class JogPanel:
-    """The joints, the tool, the target and the grippers, a tab each, which stay while it is there.
+    """Permanent tabs for joints, tool, target and grippers.
 
-    What can be driven is found out piece by piece: only what offers something else than before is
-    made anew, so that a person stays in the tab that is open.
+    The node discovers the movable parts one by one: only tabs whose content changes are rebuilt,
+    so that the open tab stays open.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class JogPanel:
         ways: tuple[Actions, Live, Share],
         place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
-        """Offer nothing yet."""
+        """Start with empty tabs."""
         self._actions, self._live, self._speed = ways
         self._gui, self._robot = gui, robot
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
@@ -121,13 +121,13 @@ class JogPanel:
             self._tabs = {
                 name: _Tab(tabs.add_tab(name)) for name in ('Joints', 'Tool', 'Target', 'Gripper')
             }
-            # of tabs that are not shown there are no buttons; keys hold these
+            # hidden tabs have no buttons; keys hold these
             self._keys = self._gui.add_html('')
         self._filled = self._tabs['Joints']
         self.offer(Offered())
 
     def offer(self, offered: Offered) -> None:
-        """Offer to drive what there is now."""
+        """Update the tabs to what can be moved now."""
         frames = tool_frames(self._robot.tree, offered.joints) if offered.tool else None
         self._fill('Joints', offered.joints, self._add_joints)
         self._fill('Tool', frames, self._add_twists)
@@ -137,7 +137,7 @@ class JogPanel:
         self._keys.content = pad(holds, 'rv-keyed')
 
     def _fill(self, name: str, offered: _Offer, add: Callable[[_Offer], None]) -> None:
-        """Fill a tab anew where it offers something else than before."""
+        """Rebuild a tab if its content has changed."""
         tab = self._tabs[name]
         if tab.content is not None:
             if tab.offered == offered:
@@ -152,7 +152,7 @@ class JogPanel:
             add(offered)
 
     def remove(self) -> None:
-        """Remove the target from the picture; the page removes its groups."""
+        """Remove the target from the scene; the page removes the groups."""
         if self.target is not None:
             self.target.remove()
 
@@ -251,14 +251,14 @@ class JogPanel:
 
 
 def tool_frames(tree: KinematicTree, joints: Sequence[str]) -> list[str]:
-    """Return the links that all of some joints in a row move, the nearest to them first."""
+    """Return the links that all joints of a chain move, the closest first."""
     moving = [joint for joint in tree.joints if joint.name in joints]
     if not moving:
         return []
     depths = {joint.child: len(tree.chain(tree.root, joint.child)) for joint in moving}
     frames = [max(depths, key=lambda link: depths[link])]
     own = {joint.name for joint in tree.movable()} - set(joints)
-    for link in frames:  # it grows
+    for link in frames:  # grows in the loop
         frames += [j.child for j in tree.joints if j.parent == link and j.name not in own]
     return frames
 
@@ -266,7 +266,7 @@ def tool_frames(tree: KinematicTree, joints: Sequence[str]) -> list[str]:
 def joint_texts(
     tree: KinematicTree, positions: Mapping[str, float]
 ) -> dict[str, tuple[str, float]]:
-    """Return position in words and share of the range of each joint that is known."""
+    """Return text and fraction of the range for each joint with a known position."""
     found = {}
     for joint in tree.movable():
         position = positions.get(joint.name)
@@ -280,21 +280,21 @@ def joint_texts(
 
 HOLD_TARGET = 'Hold to move to the target'
 TARGET_TINT: Tint = (0.44, 0.28, 0.91, 0.35)
-REACHED = 0.01  # how near to the target in [rad] or [m] it is not shown any more
+REACHED = 0.01  # distance in [rad] or [m] below which the target is hidden
 HEIGHT = 170  # of a plot in [px]
 TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#7048e8', '#1864ab', '#495057'
-KEPT = 30.0  # how long the past is kept in [s]
-STEP = 0.1  # least time between two samples in [s]
+KEPT = 30.0  # length of the history in [s]
+STEP = 0.1  # minimum time between two samples in [s]
 SHORTEST = 0.3  # shortest motion in [s]
 GREATEST_ACCELERATION = 2.0
-"""Of a motion to a target in [rad/s^2] or [m/s^2]: descriptions name none."""
+"""Acceleration limit to a target in [rad/s^2] or [m/s^2]: a URDF has none."""
 PEAK, PEAK_ACCELERATION = 15.0 / 8.0, 10.0 / math.sqrt(3.0)
-"""Greatest velocity and acceleration of a quintic from rest to rest: as a multiple of its mean
-velocity, and of its way through the square of its time."""
+"""Peak velocity and acceleration of a quintic from rest to rest, relative to its mean velocity and
+to distance / duration^2."""
 
 
 class TargetPanel:
-    """A slider for each joint; it moves a violet target, and the joint only while it is held."""
+    """A slider per joint moves a violet target; the joints move only while a button is held."""
 
     def __init__(
         self,
@@ -315,14 +315,14 @@ class TargetPanel:
         gui.add_html(pad([html], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
-            step = 10.0 ** math.floor(math.log10((high - low) / 1000.0))  # few digits beside it
+            step = 10.0 ** math.floor(math.log10((high - low) / 1000.0))  # to show few digits
             slider = gui.add_slider(joint.name, low, high, step, low)
             slider.on_update(partial(self._moved, joint.name))
             self._sliders[joint.name] = slider
         add_button(gui, 'Put the target where the robot is', self._targets.clear)
 
     def follow(self, positions: Mapping[str, float]) -> None:
-        """Show the target; without one the sliders follow the joints."""
+        """Update the target; without one the sliders follow the joints."""
         targets = dict(self._targets)
         if targets and all(
             abs(positions.get(name, np.inf) - at) < REACHED for name, at in targets.items()
@@ -346,7 +346,7 @@ class TargetPanel:
             self._ghost.remove()
 
     async def _moved(self, joint: str, event: GuiEvent[GuiSliderHandle[float]]) -> None:
-        if event.client_id is not None:  # or it follows its joint
+        if event.client_id is not None:  # else the slider follows its joint
             self._targets[joint] = value_of(event.target)
 
     def _move(self) -> None:
@@ -383,7 +383,7 @@ class PlotPanel:
         )
 
     def show(self, history: History, now: float) -> None:
-        """Draw the joint that is chosen."""
+        """Plot the selected joint."""
         times, targets, positions = history.of(self._joint.value)
         if len(times):
             self._positions.data = (times - now, targets, positions)
@@ -396,9 +396,9 @@ def motion_time(
     velocities: Mapping[str, float],
     share: float,
 ) -> float:
-    """Return how long a smooth motion takes, at a share of the greatest velocities.
+    """Return the duration of a smooth motion in [s], at a fraction of the maximum velocities.
 
-    Joints without a start do not move; those without a velocity have 1.
+    Joints without a start do not move; joints without a velocity limit have 1 [rad/s] or [m/s].
     """
     longest = SHORTEST
     for name, position in target.items():
@@ -416,18 +416,18 @@ class History:
     """The samples of all joints in the last :data:`KEPT` seconds."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Start empty."""
         self._samples: dict[str, deque[tuple[float, float, float]]] = {}
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that have samples."""
+        """Joints with samples."""
         return tuple(self._samples)
 
     def add(
         self, targets: Mapping[str, float], positions: Mapping[str, float], now: float
     ) -> None:
-        """Store joint positions; ones that come too soon after the last are ignored."""
+        """Store targets and positions, unless the last sample is too recent."""
         for name in (each for each in targets if each in positions):
             samples = self._samples.setdefault(name, deque())
             if samples and now - samples[-1][0] < STEP:
@@ -437,7 +437,7 @@ class History:
                 samples.popleft()
 
     def of(self, joint: str) -> npt.NDArray[np.float64]:
-        """Return rows of times, of where a joint was to be, and of where it was."""
+        """Return rows of times, targets and positions of a joint."""
         samples = np.array(self._samples.get(joint, ()), float).reshape(-1, 3)
         rows: npt.NDArray[np.float64] = samples.T.copy()
         return rows

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The overlay's own connection with each page: heartbeats of held buttons in, the state out.
+"""The overlay's WebSocket to each page: receives heartbeats of held buttons, sends the state.
 
-viser has one sender for all inputs of a page, which drops the older of two that come within 50 ms.
-Held buttons and the state of the robot have a WebSocket of their own, on the same port.
+viser has one sender for all inputs of a page, which drops the older of two within 50 ms. Held
+buttons and robot state therefore use a separate WebSocket on the same port.
 """
 
 from __future__ import annotations
@@ -26,46 +26,46 @@ from ..robot_state import ALLOW
 
 LIVE_PATH = '/live'
 NO_PAGE = 0
-"""No page has this number."""
+"""Number that no page has."""
 HEARTBEAT = 1.0 / 30.0  # time between two heartbeats of a held button in [s]
 LEAST_GAP = 0.4 * HEARTBEAT
-"""Heartbeats that are nearer to each other in [s] were held up: they may be of a button let go."""
-RELEASED_AFTER = 0.3  # silence in [s] after which a button counts as let go
+"""Minimum gap of heartbeats in [s]: closer ones were delayed, and may be of a released button."""
+RELEASED_AFTER = 0.3  # time in [s] without heartbeat after which a button counts as released
 
 _Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """A button that acts as long as it is held."""
+    """A button that acts while it is held."""
 
-    label: str  # what it is called, and what is held
+    label: str  # its text, also shown while it is held
     act: Callable[[], None]  # called with each heartbeat
-    rest: Callable[[], None]  # called when it is let go
+    rest: Callable[[], None]  # called on release
     start: Callable[[], None] | None = None  # called with the first heartbeat of a press
-    always: bool = False  # it counts whatever state the robot is in, but not after STOP
+    always: bool = False  # acts in any state of the robot, but not after STOP
     key: str = ''
-    """The key that holds it, where keys move the robot; that of a joint with its direction."""
+    """Key that holds the button if keys move the robot; for a joint with its direction."""
 
 
 class Live:
-    """The pages that are open, and the buttons that are held on them.
+    """Open pages, and the buttons held on them.
 
     Attributes:
-        movable: The state of the robot lets it be moved.
-        off: Why a button would do nothing now, by its number.
-        stopped: STOP was pressed, and nothing was allowed since.
+        movable: Whether the state of the robot permits motion.
+        off: Reasons why buttons are inactive now, by button number.
+        stopped: Whether STOP was pressed, and motion not allowed again since.
         held: Label of the button that is held; empty for none.
     """
 
     def __init__(self, command: Callable[[str, str], None]) -> None:
-        """Set what a command of a page does: its word and what stands behind it."""
+        """Set the handler for commands of a page: a word and its argument."""
         self._command = command
         self._deadman = Deadman()
         self._numbers = itertools.count(1)
         self._holds: dict[int, Hold] = {}
         self._pages: dict[int, tuple[ServerConnection, str]] = {}
-        self._started: set[tuple[int, int]] = set()  # presses that have begun
+        self._started: set[tuple[int, int]] = set()  # presses whose start was processed
         self._label = ''
         self._loop: asyncio.AbstractEventLoop | None = None
         self._last = ''
@@ -75,7 +75,7 @@ class Live:
     # -- buttons
 
     def button(self, hold: Hold) -> tuple[int, str]:
-        """Return the number of a new button and its HTML."""
+        """Create a button; return its number and HTML."""
         number = next(self._numbers)
         self._holds[number] = hold
         kind = 'rv-hold rv-always' if hold.always else 'rv-hold'
@@ -111,13 +111,13 @@ class Live:
         return int(self._deadman.holder or NO_PAGE)  # type: ignore[call-overload, no-any-return]
 
     def end(self, number: int) -> None:
-        """End the press of a button: what it did has ended, and it moves nothing more."""
+        """Ignore the rest of a button's press, because its motion has ended."""
         self._deadman.end(number)
 
     def refuses(self, what: str, *, always: bool = True) -> bool:
-        """Whether something that one press requests may not be done now; if so the page says why.
+        """Return whether a single-press request is refused now; if so, report why on the page.
 
-        ``always``: it counts whatever state the robot is in, but not after STOP.
+        ``always`` permits it in any state of the robot, but not after STOP.
         """
         if self.stopped:
             self._command('say', f'{what}: stopped; press {ALLOW} first')
@@ -128,7 +128,7 @@ class Live:
         return True
 
     def stop(self) -> None:
-        """Release what is held, and bar motion until it is allowed."""
+        """Release held buttons, and block motion until it is allowed again."""
         self.stopped = True
         self._deadman.stop()
 
@@ -187,12 +187,12 @@ class Live:
             self._deadman.leave(page)
 
     def show(self, state: dict[str, object]) -> None:
-        """Show a state on all pages, from any thread."""
+        """Send a state to all pages. Thread-safe."""
         kind = self._pages.get(self.holder, (None, ''))[1]
         more = {'holder': self.holder, 'kind': kind, 'off': self.off}
         self._last = json.dumps({**state, **more})
         if self._loop is not None:
-            with suppress(RuntimeError):  # it has ended
+            with suppress(RuntimeError):  # the event loop has ended
                 self._loop.call_soon_threadsafe(self._send, self._last)
 
     def _send(self, text: str) -> None:
@@ -200,34 +200,33 @@ class Live:
 
 
 class Deadman:
-    """Distinguishes a heartbeat that counts from one that does not.
+    """Decides which heartbeats are valid.
 
-    A caller that moves something sends one command for each heartbeat that counts, and nothing
-    else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
-    slow connection has held up and delivers at once, one counts. After a stop a button that was
-    held has to be let go, however its heartbeats pause. A refused press has to be released, too;
-    otherwise the robot would start when the reason for the refusal ends.
+    The caller sends one motion command per valid heartbeat, and no others: if a page is gone, the
+    robot's own time-out stops the motion. If several heartbeats arrive together, only one counts.
+    After a stop, a held button must be released, however its heartbeats pause. A refused press
+    must be released, too; otherwise the robot would start when the reason for the refusal ends.
 
-    One page has control: the first that holds a button, until it is closed or another takes it.
+    One page has control: the first that holds a button, until it closes or another takes over.
 
     Attributes:
         holder: The page that has control; None for none.
     """
 
     def __init__(self) -> None:
-        """Begin with no button held."""
+        """Start with no button held."""
         self.holder: Hashable = None
         self._last = -math.inf
-        self._pressed: set[_Press] = set()  # what was not let go
-        self._barred: set[_Press] = set()  # what has to be, after a stop
+        self._pressed: set[_Press] = set()  # not released yet
+        self._barred: set[_Press] = set()  # ignored until released
         self._released: dict[_Press, float] = {}
 
     def stop(self) -> None:
-        """Ignore heartbeats of a button that is held now, until it is released."""
+        """Ignore all buttons held now until they are released."""
         self._barred |= self._pressed
 
     def end(self, button: Hashable) -> None:
-        """Ignore a button that is held until it is released: what it did has ended."""
+        """Ignore a held button until it is released, because its motion has ended."""
         pressed = tuple(self._pressed)  # another thread may add to it
         ended = {press for press in pressed if press[1] == button}
         self._barred |= ended
@@ -235,7 +234,7 @@ class Deadman:
             self._last = -math.inf
 
     def bar(self, page: Hashable, button: Hashable) -> None:
-        """Ignore a press that may not move anything now, until it is released."""
+        """Ignore a refused press until it is released."""
         self._pressed.add((page, button))
         self._barred.add((page, button))
 
@@ -244,13 +243,13 @@ class Deadman:
         return now - self._last < RELEASED_AFTER
 
     def take(self, page: Hashable, now: float) -> bool:
-        """Give control to a page, unless a button is held; return whether it has it."""
+        """Give control to a page, unless a button is held; return whether the page has control."""
         if not self.held(now):
             self.holder = page
         return self.holder == page
 
     def leave(self, page: Hashable) -> None:
-        """Forget a page that was closed."""
+        """Remove a closed page."""
         for presses in (self._pressed, self._barred):
             presses.difference_update([press for press in tuple(presses) if press[0] == page])
         self._released = {press: at for press, at in self._released.items() if press[0] != page}
@@ -258,7 +257,7 @@ class Deadman:
             self.holder = None
 
     def release(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Record that a page has released; return whether it was the one that held."""
+        """Record the release of a button; return whether its page has control."""
         press = page, button
         self._pressed.discard(press)
         self._barred.discard(press)
@@ -268,10 +267,10 @@ class Deadman:
         return page == self.holder
 
     def beat(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Process a heartbeat; return whether it counts."""
+        """Process a heartbeat; return whether it is valid."""
         press = page, button
         if now - self._released.get(press, -math.inf) < LEAST_GAP:
-            return False  # of the button that was let go; a slow connection brings it later
+            return False  # late heartbeat of a released button
         self._pressed.add(press)
         if press in self._barred:
             return False

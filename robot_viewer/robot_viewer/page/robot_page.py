@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a robot: its groups Drive, Plan or Body, See and Diagnose, below STOP and state."""
+"""The page of a robot: STOP and state, then groups Drive, Plan or Body, See and Diagnose."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from .style import (
     WARNING,
 )
 
-ARM_SPEED, LEGS_SPEED = 20.0, 30.0  # in the beginning, in [%]
+ARM_SPEED, LEGS_SPEED = 20.0, 30.0  # initial speeds in [%]
 PANEL_WIDTH = 400  # in [px]
 WALKS: Mapping[str, tuple[str, Velocity]] = {
     'Turn left': ('j', (0.0, 0.0, 1.5)),
@@ -64,8 +64,8 @@ WALKS: Mapping[str, tuple[str, Velocity]] = {
     'Back to the left': ('m', (-0.3, 0.0, -1.5)),
     'Back to the right': ('.', (-0.3, 0.0, 1.5)),
 }
-"""Keys of teleop_keyboard, and velocities at full speed: forwards and to the left in [m/s], of a
-turn in [rad/s]. The last four have no button."""
+"""Keys of teleop_keyboard, and full-speed velocities: forward and left in [m/s], yaw rate in
+[rad/s]. The last four have no button."""
 WALK_BUTTONS = 6
 MODES: Mapping[str, str] = {
     'Stand': 'stand',
@@ -76,8 +76,8 @@ MODES: Mapping[str, str] = {
     'Get up': 'get_up',
     'Follow policy': 'policy',
 }
-"""Modes of a walking robot by their buttons."""
-IN_FAULT = frozenset({'lie', 'relax', 'get_up'})  # those that are possible with a fault
+"""Modes of a walking robot by button label."""
+IN_FAULT = frozenset({'lie', 'relax', 'get_up'})  # modes that are permitted in a fault
 GAITS = ('trot', 'crawl', 'pace')
 DRIVE_GROUPS: Mapping[str, Mapping[str, str]] = {
     '': {'Enable': 'enable', 'Recover': 'recover', 'Halt': 'halt'},
@@ -91,10 +91,10 @@ DRIVE_GROUPS: Mapping[str, Mapping[str, str]] = {
         'Velocity mode': 'velocity_mode',
     },
 }
-"""Services of a drive by what they are for and their labels; what has a title is folded."""
+"""Drive services by group title and label; groups with a title are folded."""
 DISABLE, SINKS = 'disable', 'Disable: no torque, the arm may sink (hold 1 s)'
-DISABLE_AFTER = 1.0  # how long that is held in [s]
-MOTIONS = frozenset({'home', 'init'})  # services of a drive that may move it
+DISABLE_AFTER = 1.0  # time in [s] to hold the button
+MOTIONS = frozenset({'home', 'init'})  # drive services that may move the drive
 BUTTON_COLORS = {'enable': WANTED, 'home': CAUTION, 'quick_stop': CAUTION, 'relax': CAUTION}
 NO_DRIVE, ALL_DRIVES = 'none chosen', 'all drives'
 WORST = (2, 3, 1, 0)  # levels of a status, the worst first
@@ -104,14 +104,14 @@ VIEWS: Mapping[str, tuple[str, Velocity]] = {
     'Side': ('Y', (0.0, -0.9, 0.16)),
     'Top': ('T', (0.001, 0.0, 1.05)),
 }
-"""Hotkey and place of the camera of each view, by the size of the robot."""
+"""Hotkey and camera position of each view, the position relative to the robot's size."""
 STATUS_BOX = 'margin:0 12px 0.5em 2.2em;height:2.5em;line-height:1.25em;overflow:auto'
-"""Style of what a status says: no button below moves with its length."""
+"""Style of status texts, of fixed height so that buttons below do not move."""
 KEYS_MOVE = (
     '<div class="rv-speed"><span></span>'
     '<label><input type="checkbox" tabindex="-1">Keys move the robot (? lists them)</label></div>'
 )
-"""The speed in words, and a box that each page has for itself."""
+"""Speed text, and a checkbox that is local to each page."""
 COPY_LOG = '<button class="rv-copy">Copy log</button>'
 GROUPS = {
     'Drive': (Icon.DEVICE_GAMEPAD_2, 'No robot is here yet.'),
@@ -120,27 +120,27 @@ GROUPS = {
     'See': (Icon.EYE, ''),
     'Diagnose': (Icon.STETHOSCOPE, ''),
 }
-"""Icons, and what an empty group says."""
+"""Icon and placeholder text of each group."""
 
 
 class Overlay(TypedDict):
-    """What the overlay alone shows of a robot."""
+    """Values that only the overlay shows."""
 
-    stop: str  # the stage of the STOP that counts: braking, stopped, failed, or empty
+    stop: str  # stage of the active STOP: braking, stopped, failed, or empty
     simulated: bool
-    program: str  # the name of one that moves it; empty for none
-    listens: str  # where robots are looked for, in words
+    program: str  # program that moves the robot; empty for none
+    listens: str  # text on where the page searches for robots
 
 
 class Panel(Protocol):
-    """What stands in a group, for one robot."""
+    """Content of a group, for one robot."""
 
     def remove(self) -> None:
-        """Remove it from the page, but for what goes with its group."""
+        """Remove what does not disappear with the group."""
 
 
 class RobotPage:
-    """A page in a browser; shows come from one thread, actions leave in any."""
+    """The page in a browser. One thread updates it; its actions come from any thread."""
 
     def __init__(self, host: str, port: int, actions: Actions) -> None:
         self._actions = actions
@@ -148,7 +148,7 @@ class RobotPage:
         gate = Gate(host, self._stop, self.live)
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self.server = ViserServer(host, port, label='robot', verbose=False)
-        # where it is, with the token where it needs one
+        # with the token if one is required
         self.url = f'http://{shown_host(host)}:{self.server.get_port()}'
         if gate.token:
             self.url += f'/?token={gate.token}'
@@ -164,19 +164,19 @@ class RobotPage:
             command.on_trigger(partial(self._look_from, view))
         self.server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
         self._log = Log()
-        self.last = ''  # what was said last, with the time
+        self.last = ''  # the last message, with its time
         self._panels: dict[type, Panel] = {}
         self._tabs: GuiTabGroupHandle | None = None
         self._lay_out(('Drive', 'Plan', 'See', 'Diagnose'))
 
     def _lay_out(self, groups: Sequence[str]) -> None:
-        """Make the groups anew; what was in them is offered again."""
+        """Rebuild the groups; their content must be offered again."""
         if self._tabs is not None:
             self._tabs.remove()
         self.live.clear()
-        # of the tool or of walking forwards in [m/s], by the share; None where unknown
+        # tool or forward walking speed in [m/s] by speed fraction; None if unknown
         self.velocity: Callable[[float], float] | None = None
-        self.cancel: Callable[[], object] = lambda: None  # drops what is planned
+        self.cancel: Callable[[], object] = lambda: None  # discards the plan
         gui = self.server.gui
         self._tabs = gui.add_tab_group()
         self._groups: dict[str, GuiTabHandle] = {}
@@ -193,7 +193,7 @@ class RobotPage:
         self._disable: int | None = None
         self._walk_holds: dict[int, Velocity] = {}
         with self._groups['Drive']:
-            # share of the greatest velocity that is chosen, above 0 to 1
+            # selected fraction of maximum velocity, above 0 to 1
             self.speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
             gui.add_html(KEYS_MOVE)
         with self._groups['See']:
@@ -212,7 +212,7 @@ class RobotPage:
                 self._log_html = gui.add_html('')
 
     def offer_to_see(self, what: str, show: Callable[[bool], None], *, seen: bool = True) -> None:
-        """Offer to show something in the picture, as long as this robot is shown."""
+        """Add a checkbox that shows or hides something in the scene, for this robot."""
         with self._groups['See']:
             box = self.server.gui.add_checkbox(f'Show {what}', seen, order=self._see.order - 0.5)
         box.on_update(lambda _: show(box.value))
@@ -231,14 +231,14 @@ class RobotPage:
         return self.live.open or bool(self.server.get_clients())
 
     def close(self) -> None:
-        """Serve it no more."""
+        """Stop serving the page."""
         with redirect_stdout(io.StringIO()):
             self.server.stop()
 
     # -- what is shown
 
     def show_robot(self, tree: KinematicTree) -> list[str]:
-        """Show another robot; return what of it cannot be shown, in words."""
+        """Show another robot; return notes on what cannot be shown."""
         for panel in self._panels.values():
             panel.remove()
         self._panels = {}
@@ -274,22 +274,22 @@ class RobotPage:
         client.camera.look_at = (0.0, 0.0, height)
 
     def show_base(self, pose: Transform) -> None:
-        """Show how the root link is in the world, and that it moves there."""
+        """Show the pose of the root link in the world, with the grid moving below it."""
         if self.robot is not None:
             self.robot.place_base(self._ground.pass_below(pose))
 
     def follow(self, positions: Mapping[str, float]) -> None:
-        """Show the target beside where the joints are."""
+        """Update the target for the present joint positions."""
         if self._jog is not None and self._jog.target is not None:
             self._jog.target.follow(positions)
 
     def end_target(self) -> None:
-        """End the press that moves to the target: that motion has ended."""
+        """Ignore the rest of the press that moves to the target: the motion has ended."""
         if self._jog is not None and self._jog.target is not None:
             self.live.end(self._jog.target.hold)
 
     def show_state(self, state: RobotState, positions: Mapping[str, float], more: Overlay) -> None:
-        """Show how the robot is, and enable what may be done then."""
+        """Show the state of the robot, and enable the controls that it permits."""
         self.live.movable = state.movable
         if self.robot is not None:
             self.robot.mark(state.faulty)
@@ -317,7 +317,7 @@ class RobotPage:
         )
 
     def show_mode(self, mode: str) -> None:
-        """Show the mode of a walking robot, and which arrows move it then."""
+        """Show the mode of a walking robot, and which arrow buttons move it."""
         for name, button in self._modes.items():
             button.color = PRESENT if name == mode else BUTTON_COLORS.get(name, NEUTRAL)
         for number, (x, y, _) in self._walk_holds.items():
@@ -328,7 +328,7 @@ class RobotPage:
                 self.live.off[number] = 'Turn ignores forward and sideways. Press Walk first.'
 
     def show_statuses(self, statuses: Sequence[Status]) -> None:
-        """Show how everything is, what is worst first."""
+        """Show all statuses, the worst first."""
         ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
         self._statuses.content = ''.join(
             f'{status_line(status.name, status.level)}'
@@ -345,7 +345,7 @@ class RobotPage:
         )
 
     def plot(self, history: History, now: float) -> None:
-        """Draw what the joints did until now."""
+        """Update the plots of the joints."""
         if self._plots is None and history.joints:
             with self._see:
                 self._plots = PlotPanel(self.server.gui, history.joints)
@@ -355,7 +355,7 @@ class RobotPage:
     # -- what is offered
 
     def offer_drives(self, services: Mapping[str, Sequence[str]]) -> None:
-        """Offer the services of drives: their names by the drive."""
+        """Show the services of drives; ``services`` lists service names by drive."""
         found = {name: tuple(verbs) for name, verbs in services.items()}
         if found == self._drives:
             return
@@ -391,7 +391,7 @@ class RobotPage:
             nonlocal pressed, last
             now = time.monotonic()
             if now - last > RELEASED_AFTER and pressed < math.inf:
-                pressed = now  # a link that was held up: the finger may have left
+                pressed = now  # delayed connection: the button may be released
             last = now
             if now - pressed >= DISABLE_AFTER:
                 pressed = math.inf
@@ -402,17 +402,17 @@ class RobotPage:
         self.server.gui.add_html(f'<div class="rv-one">{html}</div>')
 
     def offer_drive(self, offered: Offered) -> None:
-        """Offer to drive an arm: joints, tool, targets and grippers."""
+        """Show the controls of an arm: joints, tool, targets and grippers."""
         if self._jog is not None:
             self._jog.offer(offered)
 
     def has(self, group: str) -> bool:
-        """Whether there is a group for the robot that is shown."""
+        """Return whether the present robot has a group."""
         return group in self._groups
 
     @contextmanager
     def place(self, group: str, panel: Panel) -> Iterator[None]:
-        """Put what the block adds into a group, in the place of an earlier panel of its kind."""
+        """Put elements added in the block into a group, replacing the panel of this type."""
         before = self._panels.pop(type(panel), None)
         if before is not None:
             before.remove()
@@ -422,7 +422,7 @@ class RobotPage:
             yield
 
     def offer_walk(self, *, policy: bool) -> None:
-        """Offer to walk as long as a button is held, and the modes of the robot."""
+        """Show the hold-to-walk buttons, and the modes of the robot."""
         if self._modes or not self.has('Body'):
             if 'policy' in self._modes:
                 self._modes['policy'].visible = policy
@@ -459,11 +459,11 @@ class RobotPage:
             self.say(rest, failed=True)
 
     def _stop(self) -> Future[Stop]:
-        self.live.stop()  # or a button that is held would go on
+        self.live.stop()  # else a held button would continue
         return self._actions.stop()
 
     def allow(self) -> None:
-        """Allow the page to move the robot again after STOP; nothing moves by that."""
+        """Allow the page to move the robot again after STOP; this itself moves nothing."""
         self.live.stopped = False
 
     def _walk(self, velocity: Velocity) -> None:
@@ -485,15 +485,15 @@ class RobotPage:
     # -- the log
 
     def say(self, text: str, *, failed: bool | None = False) -> None:
-        """Show what became of the last request; with None that is not known yet."""
+        """Show the outcome of the last request; ``failed`` is None while unknown."""
         now = time.time()
         self.last = f'{time.strftime("%H:%M:%S", time.localtime(now))}  {text}'
         self._log.add(now, 'page', text, WARNING if failed is None else BAD if failed else GOOD)
 
     def log(self, at: float, who: str, text: str, *, failed: bool) -> None:
-        """Keep what a node of the robot said."""
+        """Store a log message of a node of the robot."""
         self._log.add(at, who, text, BAD if failed else WARNING)
 
     def list_log(self) -> None:
-        """Show what was said."""
+        """Show the log."""
         self._log_html.content = f'{COPY_LOG}<div>{self._log.html}</div>'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot in the 3D scene of a page: its links with what they look like, moved by its joints."""
+"""A robot in the 3D scene of a page: link shapes, moved by joint positions."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]  # red, green, blue and opacity from 0 to 1
 AXES = (0.1, 0.004)  # length and radius of the axes of joints in [m]
-SECTION = 0.5  # between thick lines of the ground in [m]
+SECTION = 0.5  # distance of the grid's thick lines in [m]
 
 
 FAULTY: Tint = (0.79, 0.16, 0.16, 1.0)  # of the links of joints whose drives report a fault
 PLAIN = (0.7, 0.72, 0.75, 1.0)
-"""Color of what the description gives none: red, green, blue and opacity from 0 to 1."""
-FOOT = '_foot'  # how the names of the links of feet end
+"""Color of shapes without color in the URDF: red, green, blue and opacity from 0 to 1."""
+FOOT = '_foot'  # name suffix of foot links
 LEAST_FEET = 3
 
 
 class Ground:
-    """A grid that passes below a robot that goes somewhere, so that it stays in view."""
+    """A grid that moves below a walking robot, so that the robot stays in view."""
 
     def __init__(self, scene: SceneApi) -> None:
         self._grid = scene.add_grid(
@@ -50,14 +50,14 @@ class Ground:
         )
 
     def pass_below(self, pose: Transform) -> Transform:
-        """Move the ground; return where the root link is shown."""
+        """Move the grid; return the pose at which to show the root link."""
         x, y, z = pose.translation
         self._grid.position = (-(x % SECTION), -(y % SECTION), 0.0)
         return Transform((0.0, 0.0, z), pose.rotation)
 
 
 class RobotScene:
-    """The links of a robot below one another in a scene, so that a joint moves one frame."""
+    """Nested link frames of a robot in a scene: a joint moves a single frame."""
 
     def __init__(
         self,
@@ -67,11 +67,11 @@ class RobotScene:
         seen: tuple[frozenset[str], Tint] | None = None,
         meshes: Meshes | None = None,
     ) -> None:
-        """Show the robot, each joint at zero or the limit next to it.
+        """Show the robot, each joint at zero or the limit closest to it.
 
-        ``seen`` are the links that are shown alone, and the color of all of them.
+        ``seen`` restricts the shown links, and gives all of them one color.
         """
-        self.notes: list[str] = []  # what cannot be shown, in words
+        self.notes: list[str] = []  # what cannot be shown
         self._scene, self.tree = scene, tree
         self._tint: Tint | None
         self._links, self._tint = seen or (frozenset(tree.links), None)
@@ -79,12 +79,12 @@ class RobotScene:
         self._movable = {joint.name: joint for joint in tree.movable()}
         self._base = scene.add_frame(name, show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
-        # below the link that each hangs on; parents come first
+        # nested below the parent link; parents come first
         self._paths = {tree.root: f'{name}/{tree.root}'}
         for joint in parents_first(tree):
             self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
         scene.add_frame(self._paths[tree.root], show_axes=False)
-        self._shapes: dict[str, list[tuple[str, UrdfShape]]] = {}  # of each link, by its path
+        self._shapes: dict[str, list[tuple[str, UrdfShape]]] = {}  # per link, with node paths
         self._marked: frozenset[str] = frozenset()
         self._add_joints()
         self._add_shapes()
@@ -93,7 +93,7 @@ class RobotScene:
         self.size = self._reach(tree.root)  # how far its links reach from the root in [m]
 
     def place(self, positions: Mapping[str, float]) -> None:
-        """Move joints; those that follow one of them move along, names of others do not matter."""
+        """Move joints, with their mimic joints; unknown names are ignored."""
         for name, joint in self._movable.items():
             position = joint_position(joint, positions)
             if position is not None and math.isfinite(position):
@@ -104,11 +104,11 @@ class RobotScene:
         put(self._base, pose)
 
     def ghost(self, name: str, links: frozenset[str], tint: Tint) -> RobotScene:
-        """Return the robot once more, on the same base, with joints of its own."""
+        """Return a second copy of the robot on the same base, with independent joints."""
         return RobotScene(self._scene, self.tree, f'{ROOT}/{name}', (links, tint), self._meshes)
 
     def show(self, *, seen: bool) -> None:
-        """Show or hide it."""
+        """Show or hide the robot."""
         self._base.visible = seen
 
     def show_frames(self, *, seen: bool) -> None:
@@ -117,7 +117,7 @@ class RobotScene:
             frame.show_axes = seen
 
     def mark(self, joints: Collection[str]) -> None:
-        """Show the links of these joints as faulty, and no others."""
+        """Show exactly the links of these joints as faulty."""
         links = frozenset(joint.child for joint in self.tree.joints if joint.name in joints)
         for link in links ^ self._marked:
             for name, shape in self._shapes.get(link, ()):
@@ -125,7 +125,7 @@ class RobotScene:
         self._marked = links
 
     def path_of(self, frame: str) -> str:
-        """Return the node of a frame; that of the world where it is no link."""
+        """Return the node path of a link frame; that of the world for other frames."""
         return self._paths.get(frame, '')
 
     def remove(self) -> None:
@@ -160,7 +160,7 @@ class RobotScene:
                 self._shapes.setdefault(shape.link, []).append((name, shape))
             except ValueError as error:
                 missing.setdefault(str(error), []).append(shape.link)
-            except Exception as error:  # noqa: BLE001  # readers of meshes; the others are shown
+            except Exception as error:  # noqa: BLE001  # from mesh readers; show the others
                 reason = f'{type(error).__name__}: {error}'
                 missing.setdefault(reason, []).append(shape.link)
         self.notes += [f'{", ".join(links)}: {reason}' for reason, links in missing.items()]
@@ -199,7 +199,7 @@ class RobotScene:
 
 
 def travel(joint: Joint) -> tuple[float, float]:
-    """Return how far a joint goes in [rad] or [m]; a turn where nothing ends it."""
+    """Return the limits of a joint in [rad] or [m]; -pi and pi if unlimited."""
     try:
         lower, upper = joint.range.lower, joint.range.upper
     except DescriptionError:
@@ -209,7 +209,7 @@ def travel(joint: Joint) -> tuple[float, float]:
 
 
 def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
-    """Return how fast joints may move in [rad/s] or [m/s], of those whose description says it."""
+    """Return the velocity limits in [rad/s] or [m/s] of joints that have one."""
     found = {}
     for joint in tree.movable():
         try:
@@ -222,13 +222,13 @@ def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
 
 
 def start_position(joint: Joint) -> float:
-    """Return the position of a joint in [rad] or [m] before it is known."""
+    """Return the assumed position of a joint in [rad] or [m] until it is known."""
     lower, upper = travel(joint)
     return min(max(0.0, lower), upper)
 
 
 def put(node: SceneNodeHandle, pose: Transform) -> None:
-    """Move a node of a scene."""
+    """Set the pose of a scene node."""
     x, y, z, w = pose.rotation
     node.wxyz = w, x, y, z
     if tuple(node.position) != pose.translation:  # viser compares in 20 us
@@ -236,33 +236,33 @@ def put(node: SceneNodeHandle, pose: Transform) -> None:
 
 
 def pose_of(node: SceneNodeHandle) -> Transform:
-    """Return the pose of a node of a scene."""
+    """Return the pose of a scene node."""
     w, x, y, z = map(float, node.wxyz)
     (a, b, c) = map(float, node.position)
     return Transform((a, b, c), (x, y, z, w))
 
 
 def shapes_of(tree: KinematicTree) -> list[UrdfShape]:
-    """Return the visual shapes, and those of collision of links that have no other."""
+    """Return all visual shapes, and collision shapes of links without visual ones."""
     visuals = list(tree.visuals())
     shown = {each.link for each in visuals}
     return visuals + [each for each in tree.collisions() if each.link not in shown]
 
 
 class Meshes:
-    """Files of triangles, each of which is read once."""
+    """Cache of mesh files."""
 
     def __init__(self) -> None:
         self._read: dict[Path, trimesh.Trimesh] = {}
 
     def read(self, shape: UrdfShape) -> tuple[trimesh.Trimesh, tuple[float, float, float]]:
-        """Return the triangles of a mesh and the scale of its axes, which leads to [m].
+        """Return a mesh and the scale factors of its axes to [m].
 
         Raises:
             OSError: The file cannot be read.
             ValueError: It has no triangles, or is of an unknown format.
         """
-        import trimesh  # a third of the start of a page, and a robot without meshes needs none
+        import trimesh  # slow: a third of a page's start; not needed without meshes
 
         path = find_mesh(shape.attributes.get('filename', ''))
         try:
@@ -277,7 +277,7 @@ class Meshes:
             raise MeshFileError(f'{path}: no triangles')
         self._read[path] = mesh
         scale = shape.lengths('scale') if 'scale' in shape.attributes else (1.0, 1.0, 1.0)
-        unit = mesh_unit(path)  # trimesh leaves it to us
+        unit = mesh_unit(path)  # trimesh does not apply it
         x, y, z = (unit * each for each in scale)
         return mesh, (x, y, z)
 
@@ -285,13 +285,13 @@ class Meshes:
 def moved(
     tree: KinematicTree, positions: Mapping[str, float], goals: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return positions with some joints at goals; what follows those is left out, to follow."""
+    """Return positions with goals applied, without their mimic joints, so that these follow."""
     followers = {j.name for j in tree.movable() if j.mimic and j.mimic.source in goals}
     return {name: at for name, at in positions.items() if name not in followers} | dict(goals)
 
 
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
-    """Return the links that joints move, and those that follow one of them."""
+    """Return the links that these joints and their mimic joints move."""
     beyond: set[str] = set()
     for joint in parents_first(tree):
         follows = joint.mimic is not None and joint.mimic.source in joints
@@ -301,6 +301,6 @@ def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
 
 
 def feet_of(tree: KinematicTree) -> tuple[str, ...]:
-    """Return the links of the feet; none where there are too few to stand on."""
+    """Return the foot links; empty if there are too few to stand on."""
     feet = tuple(link for link in tree.links if link.endswith(FOOT))
     return feet if len(feet) >= LEAST_FEET else ()

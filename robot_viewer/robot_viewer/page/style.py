@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pieces of the page: colors by their meaning, marks for the overlay's style sheet, HTML, the log.
+"""Elements of the page: colors by meaning, marks for the overlay's style sheet, HTML, the log.
 
 Red is for STOP and faults alone. Contrast with the text on a color is at least 4.5.
 """
@@ -18,14 +18,14 @@ from viser import GuiApi, GuiButtonHandle, GuiDropdownHandle, GuiSliderHandle
 
 Color: TypeAlias = tuple[int, int, int]
 Share = Callable[[], float]
-"""Returns the share of the greatest velocity that was chosen, above 0 to 1."""
+"""Returns the selected fraction of maximum velocity, above 0 to 1."""
 
-NEUTRAL: Color = (233, 236, 239)  # of buttons that look, stop or choose
+NEUTRAL: Color = (233, 236, 239)  # of buttons that view, stop or select
 WANTED: Color = (24, 100, 171)
-"""Of the action that is wanted next, which gives power or executes what was shown."""
+"""Color of the suggested next action, which enables power or executes a plan."""
 CAUTION: Color = (255, 212, 59)
-"""Of what moves the robot by itself, or takes the torque: it may sink."""
-PRESENT: Color = (52, 58, 64)  # of the mode that the robot is in
+"""Color of actions that move the robot by themselves, or remove torque: it may sink."""
+PRESENT: Color = (52, 58, 64)  # of the robot's present mode
 
 Mark: TypeAlias = tuple[str, str]
 
@@ -34,14 +34,14 @@ WARNING: Mark = ('⚠', '#8a6100')
 BAD: Mark = ('⛔', '#c92a2a')
 UNKNOWN: Mark = ('?', '#495057')
 PLAIN: Mark = ('·', '#495057')
-"""What a line means: an icon and its color, as a color alone is not seen by everyone."""
+"""Meaning of a line: icon and color, since not everyone can see a color alone."""
 LEVEL_MARKS = (GOOD, WARNING, BAD, UNKNOWN)
-"""Of the levels of a status: good, warning, error and stale."""
-THREE_COLUMNS = '<b class="rv-pad3"></b>'  # marks a panel whose buttons stand in three columns
+"""Marks of the status levels: good, warning, error and stale."""
+THREE_COLUMNS = '<b class="rv-pad3"></b>'  # marks a panel with three columns of buttons
 
 
 def line(text: str, mark: Mark = PLAIN, *, strong: bool = False) -> str:
-    """Return a line behind a mark."""
+    """Return the HTML of a line with a mark."""
     icon, color = mark
     weight = 'bold' if strong else 'normal'
     return (
@@ -51,17 +51,17 @@ def line(text: str, mark: Mark = PLAIN, *, strong: bool = False) -> str:
 
 
 def status_line(text: str, level: int) -> str:
-    """Return a line with the icon of a level."""
+    """Return the HTML of a line with the icon of a status level."""
     return line(text, LEVEL_MARKS[level], strong=level not in {0, 3})
 
 
 def pad(buttons: Iterable[str], kind: str = 'rv-pad') -> str:
-    """Return buttons that are held, in columns."""
+    """Return the HTML of hold buttons in columns."""
     return f'<div class="{kind}">{"".join(buttons)}</div>'
 
 
 def sentence(text: str) -> str:
-    """Return a sentence of a panel."""
+    """Return the HTML of a sentence in a panel."""
     return f'<div style="margin:0.3em 12px">{escape(text)}</div>'
 
 
@@ -77,7 +77,7 @@ def add_button(
 def add_choice(
     gui: GuiApi, label: str, options: Iterable[str], chosen: Callable[[str], None]
 ) -> GuiDropdownHandle[str]:
-    """Add a list; reported is what is chosen on a page, and not what is set here."""
+    """Add a dropdown; ``chosen`` is called for selections on a page, not for values set here."""
     box = gui.add_dropdown(label, tuple(options))
     box.on_update(lambda e: None if e.client_id is None else chosen(e.target.value))
     return box
@@ -89,7 +89,7 @@ def value_of(slider: GuiSliderHandle[float]) -> float:
 
 
 def add_speed(gui: GuiApi, percent: float = 30.0) -> Share:
-    """Add the slider of a speed."""
+    """Add a speed slider; return a function that reads it."""
     slider = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, percent)
     return lambda: value_of(slider) / 100.0
 
@@ -108,14 +108,14 @@ DRIVE_ROWS = {
     'temperature': 'temperature',
     'missed_pdos': 'missed PDOs',
 }
-"""Values of the diagnostics of a drive that are shown, and what they are called."""
+"""Drive diagnostics that are shown, with their labels."""
 BUS_ROWS = {'bus_load': 'bus load [%]', 'frames_lost': 'frames lost', 'jitter_p99': 'jitter [s]'}
-"""The same of the bus."""
-KEPT = 200  # number of entries that are kept
+"""Bus diagnostics that are shown, with their labels."""
+KEPT = 200  # maximum number of log entries
 
 
 def drive_html(message: str, values: Mapping[str, str], bus: Mapping[str, str]) -> str:
-    """Return the table of a drive; what is not reported, or empty, has no row."""
+    """Return the HTML table of a drive; missing or empty values have no row."""
     shown = [(title, values.get(key, '')) for key, title in DRIVE_ROWS.items()]
     shown += [(title, bus.get(key, '')) for key, title in BUS_ROWS.items()]
     rows = ''.join(
@@ -140,15 +140,15 @@ class _Entry:
 
 
 class Log:
-    """The last entries; what is said again is counted. Thread-safe."""
+    """The latest log entries; repetitions are counted. Thread-safe."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Start empty."""
         self._entries: deque[_Entry] = deque(maxlen=KEPT)
         self._html, self._changed = '', False
 
     def add(self, at: float, who: str, text: str, mark: Mark) -> None:
-        """Keep an entry."""
+        """Store an entry."""
         last = self._entries[-1] if self._entries else None
         if last is not None and (last.who, last.text) == (who, text):
             last.at, last.count = at, last.count + 1
@@ -158,9 +158,9 @@ class Log:
 
     @property
     def html(self) -> str:
-        """All of it, the last entry first."""
+        """HTML of all entries, the latest first."""
         if self._changed:
-            self._changed = False  # first: another thread may add an entry meanwhile
+            self._changed = False  # before reading: another thread may add an entry
             self._html = ''.join(map(_line, reversed(tuple(self._entries))))
         return self._html
 
