@@ -311,7 +311,7 @@ class Tolerances:
 
 
 def _distinct(error: float, tolerance: float) -> tuple[str, str]:
-    """Format an error and the exceeded tolerance with enough digits to tell them apart."""
+    """Format an error and the exceeded tolerance with enough digits to distinguish them."""
     for digits in range(4, 12):
         off, most = f'{error:+.{digits}f}', f'{tolerance:.{digits}f}'
         if abs(float(off)) > float(most) > 0.0:

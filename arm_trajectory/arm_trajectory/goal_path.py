@@ -278,7 +278,7 @@ def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: Go
         return points.since(1) if len(points.times) > 1 else points
     if float(off.max()) < START_TOLERANCE:
         return points
-    # as a part of the path it obeys the speed override; peaks of a quintic from rest to rest
+    # as a part of the path it follows the speed override; peaks of a quintic from rest to rest
     needed = (
         1.875 * off / limits.velocity,
         np.sqrt(5.774 * off / limits.acceleration),

@@ -353,7 +353,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a quadruped until it is told to stop.
+    """Run a quadruped until it is stopped.
 
     Returns:
         0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 if nothing was started.
