@@ -361,7 +361,7 @@ class MotionCore:
         self._end(Outcome(code, reason))
 
     def abandon(self, reason: str, measured: RobotState | None) -> None:
-        """End any motion at once because something else commands the drives; and report it to other arms.
+        """End any motion because something else commands the drives, and report it to other arms.
 
         Args:
             measured: Measured state of the drives; None while unknown.
