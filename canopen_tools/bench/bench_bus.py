@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a frame costs on our buses, beside python-can's own in the same run.
+"""CPU time per frame of our buses, compared with python-can's in the same run.
 
-Sender and receiver are in one process and one thread, so the figures are CPU time per frame and
-no race. All of them are printed, none is judged.
+Sender and receiver share one process and thread, so that the figures are CPU time per frame. The
+benchmark prints all figures without pass or fail.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ from canopen_core.can.multicast import decode, encode
 from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000
-BATCH = 100  # frames before they are read; all buffers hold as many
+BATCH = 100  # frames sent before they are read; all buffers are large enough
 PAYLOAD = bytes(range(8))
 PORT = 29000 + os.getpid() % 900
 
 
 @dataclass
 class Peer:
-    """An open bus of either library with the same calls."""
+    """An open bus of either library behind one interface."""
 
     send: Callable[[int], None]  # sends a frame of eight bytes with this identifier
-    receive: Callable[[float], list[int]]  # waits up to some [s], and returns identifiers
+    receive: Callable[[float], list[int]]  # waits up to a timeout in [s]; returns identifiers
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A bus to be measured: one of ours by its name, or an interface of python-can."""
+    """A bus to measure: one of ours by name, or an interface of python-can."""
 
     name: str
-    options: Mapping[str, Any] = field(default_factory=dict)  # of python-can; empty for ours
+    options: Mapping[str, Any] = field(default_factory=dict)  # of python-can; empty: ours
 
     @property
     def title(self) -> str:
-        """Which bus it is."""
+        """Title of the bus in the output."""
         return f'python-can {self.name}' if self.options else self.name.partition(':')[0]
 
     @contextmanager
     def opened(self) -> Iterator[Peer]:
-        """Open it once more."""
+        """Open the bus again."""
         if not self.options:
             with open_bus(self.name) as ours:
                 yield Peer(
@@ -78,10 +78,10 @@ class Candidate:
 
 
 def candidates() -> Iterator[Candidate]:
-    """Yield each bus to be compared."""
+    """Yield the buses to compare."""
     yield Candidate('virtual:bench')
     yield Candidate('virtual', {'channel': 'bench'})
-    yield Candidate(f'udp_multicast:239.163.78.1:{PORT}')  # each on a group of its own
+    yield Candidate(f'udp_multicast:239.163.78.1:{PORT}')  # each in its own multicast group
     yield Candidate('udp_multicast', {'channel': '239.163.77.1', 'port': PORT + 1})
     for name, interface in can_interfaces().items():
         if interface.is_up and name.startswith('vcan'):
@@ -90,7 +90,7 @@ def candidates() -> Iterator[Candidate]:
 
 
 def drain(receiver: Peer, sender: Peer) -> int:
-    """Read what is there, echoes of the sender too; return the frames of the receiver."""
+    """Read all waiting frames, also echoes at the sender; return the receiver's."""
     while sender.receive(0.0):
         pass
     count = 0
@@ -115,7 +115,7 @@ def bench_cost(sender: Peer, receiver: Peer) -> tuple[float, float]:
 
 
 def bench_pieces() -> None:
-    """Print what the parts of the path cost."""
+    """Print the cost of the single steps."""
     frame = Frame(0x185, PAYLOAD, 1.0)
     datagram = encode(frame)
     load, describer = BusLoad(1_000_000, 0.0), FrameDescriber()

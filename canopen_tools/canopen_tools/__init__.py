@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The `canopen` command, `candump` in words, EDS lint, DCF export; without ROS.
+"""The `canopen` command, a decoding `candump`, EDS lint and DCF export; needs no ROS.
 
 The names here are the public API.
 """

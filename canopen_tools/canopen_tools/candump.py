@@ -33,14 +33,14 @@ from .monitor import FrameDescriber, FrameFilter
 from .monitor.describe import Description, FrameKind
 
 _LABEL_WIDTH = 10
-_DATA_WIDTH = 23  # eight bytes with blanks
-_IDENTIFIER_WIDTH = 8  # of 29 bits
+_DATA_WIDTH = 23  # eight bytes in hex with spaces
+_IDENTIFIER_WIDTH = 8  # hex digits of 29 bits
 _RED = '\x1b[1;31m'
 _RESET = '\x1b[0m'
 _COLORS: dict[FrameKind, str] = {
     FrameKind.NMT: '\x1b[35m',
     FrameKind.SYNC: '\x1b[2m',
-    FrameKind.EMCY: '\x1b[33m',  # one that reports an error is an alert, and red
+    FrameKind.EMCY: '\x1b[33m',  # errors are alerts, and red
     FrameKind.TIME: '\x1b[2m',
     FrameKind.PDO: '\x1b[36m',
     FrameKind.SDO: '\x1b[32m',
@@ -49,25 +49,25 @@ _COLORS: dict[FrameKind, str] = {
 
 
 class TimeStyle(Enum):
-    """How a line shows the time; the letters are those of can-utils' candump."""
+    """Time format of a line, with the option letters of can-utils' candump."""
 
     ABSOLUTE = 'a'  # [s] since 1970
     DATE = 'A'  # local date and time
-    DELTA = 'd'  # [s] since the line before
+    DELTA = 'd'  # [s] since the previous line
     ZERO = 'z'  # [s] since the first frame, shown or not
     NONE = 'n'
 
 
 class LineFormat:
-    """Formats frames that come in the order of time."""
+    """Formats frames in time order as text lines."""
 
     def __init__(
         self, style: TimeStyle, wall_offset: float, *, color: bool = False, node_width: int = 9
     ) -> None:
-        """Prepare the columns; wall_offset is wall clock minus that of the time stamps in [s].
+        """Set the columns; wall_offset is wall clock minus time stamp clock in [s].
 
-        Colors paint the meaning by its service, and alerts in red. The name of a device takes
-        node_width characters.
+        Colors distinguish services; alerts are red. A device name takes node_width
+        characters.
         """
         self._style = style
         self._offset = wall_offset
@@ -76,12 +76,12 @@ class LineFormat:
         self._reference: float | None = None
 
     def begin(self, stamp: float) -> None:
-        """Start the time at the first frame, so that it is the same with any filter."""
+        """Set time zero to the first frame, shown or not."""
         if self._reference is None and self._style is TimeStyle.ZERO:
             self._reference = stamp
 
     def line(self, frame: Frame, description: Description) -> str:
-        """Return the line of a frame, without its end."""
+        """Return the line of a frame, without newline."""
         has_long_id = frame.is_extended or frame.is_error
         identifier = f'{frame.can_id:08X}' if has_long_id else f'{frame.can_id:03X}'
         content = 'remote request' if frame.is_remote else frame.data.hex(' ').upper()
@@ -119,11 +119,11 @@ examples:
   candump --read pcan.trc --log bus.asc --quiet       convert a log
 """
 _NODE_WIDTH = len('all nodes')
-_LOOK_AHEAD = 1000  # frames of a log in which its buses show
+_LOOK_AHEAD = 1000  # frames of a log that are searched for bus names
 
 
 class Listener:
-    """Receives batches of frames until it is stopped or its time is over."""
+    """Receives batches of frames until a stop or timeout."""
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         """Listen for timeout [s]; infinity until :meth:`stop`."""
@@ -137,13 +137,13 @@ class Listener:
         self._bus.wake()
 
     def batches(self) -> Iterator[list[Frame]]:
-        """Yield what arrives."""
+        """Yield batches of received frames."""
         while not self._stopped and (left := self._end - monotonic()) > 0.0:
             yield self._bus.receive(left)
 
 
 class Screen:
-    """Prints the frames that a person wants to see, up to a number of them."""
+    """Prints frames that pass a filter, up to a maximum number."""
 
     def __init__(
         self,
@@ -155,7 +155,7 @@ class Screen:
         count: int | None = None,
         quiet: bool = False,
     ) -> None:
-        """Prepare; several buses have a column, and count None never ends. Quiet only counts."""
+        """Set options: several buses get a column; count None is unlimited; quiet only counts."""
         self._describers = defaultdict[str, FrameDescriber](describer)
         self._bus_width = max(map(len, buses), default=0)
         self._filter = chosen
@@ -164,7 +164,7 @@ class Screen:
         self._quiet = quiet
 
     def show(self, frames: Iterable[Frame], bus: str = '') -> bool:
-        """Print frames of a bus; return whether there is room for more."""
+        """Print frames of a bus; return False once the maximum number is reached."""
         lines = []
         describer = self._describers[bus]
         column = f'{bus:<{self._bus_width}}  ' if self._bus_width else ''
@@ -197,7 +197,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         config = load_bus(Path(options.bus_config)) if options.bus_config else None
         (_show_log if options.read else _show_bus)(options, config)
     except BrokenPipeError:
-        # the interpreter flushes stdout once more when it ends
+        # the interpreter flushes stdout again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (CanopenError, OSError) as error:
         _print_note(str(error))
@@ -206,7 +206,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
-    """Show a log as if its frames came now, or convert it; its times are of the wall clock."""
+    """Show a log as if received now, or convert it; its times are on the wall clock."""
     path, wanted = Path(options.read), options.interface
     logged = read_buses(path)
     first = list(islice(logged, _LOOK_AHEAD))
@@ -299,7 +299,7 @@ def _log(options: argparse.Namespace, name: str, offset: float) -> closing[LogWr
 
 
 def _print_note(text: str) -> None:
-    """Write for a person, beside the frames."""
+    """Write a note for the user, separate from the frames."""
     with suppress(BrokenPipeError):
         sys.stderr.write(f'candump: {text}\n')
         sys.stderr.flush()
@@ -370,7 +370,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _positive(kind: Callable[[str], float]) -> Callable[[str], float]:
-    """Return what reads a number above 0."""
+    """Return a parser of numbers above 0."""
 
     def read(text: str) -> float:
         number = kind(text)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The object dictionary of a master for a bus, as dcfgen lays it out, so that Lely can run it.
+"""The object dictionary of a bus's master for Lely, in the layout of dcfgen.
 
-What the devices send is mirrored: the n-th TPDO of all devices is RPDO n of the master and ends
-up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The objects 0x5800 to
-0x5FFF hold which object of which device each is (Lely's remote PDO mapping).
+The master mirrors the PDOs of all devices: the n-th TPDO is RPDO n of the master with values in
+0x2000 + n - 1, the n-th RPDO is TPDO n with values from 0x2200 + n - 1. Objects 0x5800 to 0x5FFF
+map each value to the object of its device (Lely's remote PDO mapping).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from canopen_core.standard import (
 
 Keys: TypeAlias = dict[str, str]
 DcfObject: TypeAlias = dict[str, Keys]
-"""The sections of an object, by what follows its index in their titles."""
+"""The sections of an object, by the suffix after its index in the title."""
 
 
 def _keys(
@@ -57,7 +57,7 @@ def _keys(
     mappable: bool = False,
     upload_file: str = '',
 ) -> Keys:
-    """Return the keys of a VAR or sub-index; without a default or a file those are left out."""
+    """Return the keys of a VAR or sub-index; an empty default or file is omitted."""
     keys = {
         'ParameterName': name,
         'ObjectType': f'0x{ObjectCode.VAR:X}',
@@ -82,7 +82,7 @@ def _var(
 
 
 def _record(name: str, parts: Sequence[Keys], code: ObjectCode = ObjectCode.RECORD) -> DcfObject:
-    """Return a record or array of sub-indices from 1 on; sub-index 0 is added."""
+    """Return a record or array with parts from sub-index 1; sub-index 0 is added."""
     count = _keys('Highest sub-index supported', U8, AccessType.CONSTANT, str(len(parts)))
     head = {
         'ParameterName': name,
@@ -101,9 +101,9 @@ def _array(
     *,
     default: str = '',
 ) -> DcfObject:
-    """Return equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2).
+    """Return an array of equal sub-indices with CompactSubObj (CiA 306-1, 4.6.3.2).
 
-    Values by sub-index are those that are not the default.
+    values has, by sub-index, those that differ from the default.
     """
     keys = _keys(name, data_type, access, default) | {
         'ObjectType': f'0x{ObjectCode.ARRAY:X}',
@@ -116,13 +116,13 @@ def _array(
 
 
 def _numbers(name: str, words: Sequence[int], size: int = 0) -> DcfObject:
-    """Return an array of numbers, in its first sub-indices where it has more."""
+    """Return an array that starts with these numbers; size may be larger."""
     values = {sub: f'0x{word:08X}' for sub, word in enumerate(words, start=1)}
     return _array(name, U32, RW, size or len(words), values)
 
 
 def _text(head: Mapping[str, Keys], objects: Mapping[int, DcfObject]) -> str:
-    """Return the text of a DCF: the sections before the objects, their lists, and the objects."""
+    """Return the text of a DCF: head sections, object lists, and objects."""
     sections = dict(head)
     for title in LISTS:
         indices = sorted(index for index in objects if _list_of(index) == title)
@@ -139,7 +139,7 @@ def _text(head: Mapping[str, Keys], objects: Mapping[int, DcfObject]) -> str:
 
 
 def _list_of(index: int) -> str:
-    """Return the list that an object stands in (CiA 306-1, 4.6.2)."""
+    """Return the title of the list that contains an object (CiA 306-1, 4.6.2)."""
     if index in (Index.DEVICE_TYPE, Index.ERROR_REGISTER, Index.IDENTITY):
         return LISTS[0]
     return LISTS[2 if 0x2000 <= index < 0x6000 else 1]
@@ -149,19 +149,19 @@ LISTS = ('MandatoryObjects', 'OptionalObjects', 'ManufacturerObjects')
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 RO, RW, WO = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.WRITE_ONLY
 DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
-"""Integer types, which a PDO may have as gaps."""
+"""Integer types that may fill gaps in a PDO."""
 
 
 SIDES: dict[str, tuple[Direction, int, int, int, AccessType]] = {
     TPDO.name: (RPDO, 0x2000, 0x5800, 0x5A00, AccessType.READ_WRITE_RPDO),
     RPDO.name: (TPDO, 0x2200, 0x5C00, 0x5E00, AccessType.READ_WRITE_TPDO),
 }
-"""By the direction as the device sees it: the direction as the master sees it, the first objects
-with the values, with the device's node id and PDO number, and with its mapping; access."""
+"""By the device's direction: the master's direction, the first objects of the values, of the
+device's node id with PDO number, and of the device's mapping; and the access type."""
 
 
 def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
-    """Return the DCF of the master, with the path of each device's concise DCF by node id.
+    """Return the master's DCF; upload_files are paths of the devices' concise DCFs by node id.
 
     Raises:
         CodecError: The devices have more PDOs of one direction than the master can have.
@@ -189,7 +189,7 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
 
 def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, str]]:
     identity, rate = master.identity, round(master.bitrate * KILOBIT)
-    # 100 is in CiA 305 alone: dcf-tools refuses a file that names it
+    # without 100, which only CiA 305 has: dcf-tools rejects it
     rates = [each for each in BIT_RATES_KBIT if each != 100 or rate == 100]
     return {
         'FileInfo': {
@@ -217,7 +217,7 @@ def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, s
             'LSS_Supported': '1',
         },
         'DummyUsage': {f'Dummy{number:04X}': '1' for number in DUMMY_TYPES},
-        'DeviceComissioning': {  # the standard misspells it
+        'DeviceComissioning': {  # misspelled in the standard
             'NodeID': str(master.node_id),
             'NodeName': '',
             'Baudrate': f'{master.bitrate * KILOBIT:g}',
@@ -282,7 +282,7 @@ def _communication(config: BusConfig) -> Iterator[tuple[int, DcfObject]]:
 def _mirrored(
     direction: Direction, pdos: Iterable[tuple[NodeConfig, PdoConfig]]
 ) -> Iterator[tuple[int, DcfObject]]:
-    """Yield what the master has for the PDOs of one direction of all devices."""
+    """Yield the master's objects for all devices' PDOs of one direction."""
     own, first_values, first_number, first_mapping, access = SIDES[direction.name]
     places: dict[tuple[int, int, int], int] = {}  # node id, object -> mapping entry
     remote = f'Remote {direction.title}'
@@ -291,7 +291,7 @@ def _mirrored(
         words = []
         for mapped in pdo.mapping:
             address = node.node_id, mapped.index, mapped.subindex
-            if address not in places:  # an object that two PDOs carry has one place
+            if address not in places:  # one entry for an object in two PDOs
                 entry = node.dictionary.get(mapped.index, mapped.subindex)
                 name = entry.name if entry is not None else object_address(*address[1:])
                 name = f'{node.name}: {name}'
@@ -311,7 +311,7 @@ def _mirrored(
 
 
 def _communication_parameter(own: Direction, pdo: PdoConfig) -> DcfObject:
-    """Return the record 0x1400 or 0x1800 of the master for a PDO of a device."""
+    """Return the master's communication parameter record for a device's PDO."""
     sends = own is TPDO
     inhibit = round((pdo.inhibit_time or 0.0) * HUNDRED_MICROSECONDS) if sends else 0
     parts = [
@@ -338,7 +338,7 @@ the guard time."""
 def network_objects(
     config: BusConfig, upload_files: Mapping[int, str]
 ) -> Iterator[tuple[int, DcfObject]]:
-    """Yield the objects by index; upload_files has the paths of concise DCFs by node id."""
+    """Yield NMT and boot objects; upload_files are paths of concise DCFs by node id."""
     nodes = config.nodes
     if upload_files:
         yield 0x1F22, _files('Concise DCF', upload_files)
@@ -356,7 +356,7 @@ def network_objects(
         values = {node.node_id: getattr(node.identity, attribute) for node in nodes}
         texts = {node_id: f'0x{value:08X}' for node_id, value in values.items() if value}
         yield index, _array(name, U32, RW, NODES, texts)
-    # master.bin has the values of these two
+    # their values are in master.bin
     yield 0x1F87, _array('Revision number', U32, RW, NODES)
     yield 0x1F88, _array('Serial number', U32, RW, NODES)
     boot_time = str(round(config.master.boot_time * MILLISECONDS))

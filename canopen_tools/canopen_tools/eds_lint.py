@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What in an EDS or DCF file misleads a master, by CiA 301, CiA 402 and the file itself.
+"""Check an EDS or DCF file for errors that mislead a master, by CiA 301, CiA 402 and itself.
 
-Reading is tolerant, as vendors' files are what they are; what it passes over is reported, too.
+The parser tolerates faults of vendors' files; this check reports them, too.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MANDATORY: dict[tuple[int, int], str] = {
     (Index.ERROR_REGISTER, 0): 'error register',
     (Index.IDENTITY, 1): 'vendor id',
 }
-"""What every CANopen device has (CiA 301, 7.5.2)."""
-PROFILE_BEGIN = 0x2000  # the objects below have one meaning for all devices (CiA 301, table 40)
+"""Objects of every CANopen device (CiA 301, 7.5.2)."""
+PROFILE_BEGIN = 0x2000  # lower indices mean the same for all devices (CiA 301, table 40)
 IN_CYCLE: dict[int, Direction] = {
     Index.CONTROLWORD: RPDO,
     Index.TARGET_POSITION: RPDO,
@@ -40,22 +40,22 @@ IN_CYCLE: dict[int, Direction] = {
     Index.STATUSWORD: TPDO,
     Index.POSITION_ACTUAL: TPDO,
 }
-"""Objects that a drive is run with in each cycle."""
+"""Objects that a master exchanges with a drive in each cycle."""
 
 
 @dataclass(frozen=True, slots=True)
 class EdsReport:
-    """What was found in an EDS or DCF."""
+    """Result of checking an EDS or DCF."""
 
-    eds: Eds | None  # its content, None when the file could not be read
-    # what contradicts the standard, and may make other tools refuse the file
+    eds: Eds | None  # its content; None if unreadable
+    # violations of the standard, for which other tools may reject the file
     errors: tuple[Problem, ...]
-    # what is odd; beginning with what the tolerant reading passed over
+    # oddities, starting with those that the parser tolerated
     warnings: tuple[Problem, ...]
 
 
 def lint_eds(path: str | os.PathLike[str]) -> EdsReport:
-    """Find everything that is wrong with an EDS or DCF file."""
+    """Check an EDS or DCF file completely."""
     path = Path(path)
     try:
         eds = load_eds(path)
@@ -96,7 +96,7 @@ def _check_objects(eds: Eds, findings: Findings) -> None:
 
 
 def _check_standard(eds: Eds, entry: ObjectEntry, known: ObjectEntry, findings: Findings) -> None:
-    """Compare an object with that of the standard; those of PDOs are looked at by themselves."""
+    """Compare an object with the standard, except PDO objects; see :func:`_check_pdos`."""
     if pdo_object(entry.index) is not None:
         return
     if entry.data_type is not known.data_type:
@@ -139,7 +139,7 @@ def _check_pdos(eds: Eds, direction: Direction, findings: Findings) -> None:
 
 
 def _check_identifier(eds: Eds, direction: Direction, number: int, findings: Findings) -> None:
-    """Devices of one kind need identifiers of their own, so the default adds the node id."""
+    """Check that the default COB-ID includes the node id, so that equal devices differ."""
     entry = eds.dictionary.get(direction.communication + number - 1, 1)
     if entry is None:
         findings.error(

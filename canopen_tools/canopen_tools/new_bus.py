@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A bus.yml of EDS files: modes, PDOs and units are chosen by what they say, with the reasons.
+"""Generates a bus.yml from EDS files: chooses modes, PDOs and units, and adds the reasons.
 
-What an EDS leaves open is not guessed: the caller gives it, or learns what is missing.
+It never guesses what an EDS leaves open: the caller provides it, or an error names it.
 """
 
 from __future__ import annotations
@@ -43,60 +43,60 @@ from canopen_core.standard import (
     TARGET_OBJECTS,
 )
 
-TURN = 2.0 * math.pi  # a turn in [rad]
+TURN = 2.0 * math.pi  # one turn in [rad]
 FAR = 10.0
-"""How many times the increments of the factor group a user may enter without being asked."""
+"""Ratio of entered increments to those of the factor group above which the user is warned."""
 
 
 class NewBusError(CanopenError):
-    """No bus.yml can be made of this; the message names the device and what is missing."""
+    """No bus.yml can be generated; the message names the device and what is missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How far an increment is."""
+    """Position scale of a joint."""
 
     # increments of the drive per rad or m of the joint; negative for the other direction
     scale: float
-    said: str  # the same in words
-    slides: bool = False  # the joint slides, so that the scale is per m
+    said: str  # the scale as text
+    slides: bool = False  # prismatic joint: the scale is per m
 
 
 @dataclass(frozen=True, slots=True)
 class NewDevice:
-    """A device of the new bus."""
+    """A device of the generated bus."""
 
-    name: str  # its name; that of the joint, for a drive
+    name: str  # for a drive the name of its joint
     node_id: int
     eds: Eds  # its EDS
-    # mode of operation; None takes the best one that the EDS names
+    # mode of operation; None selects the best one in the EDS
     mode: OperationMode | None = None
-    units: Units | None = None  # as the user entered them; None where the factor group says them
-    # turns of what the drive counts in rpm, or in the unit of angles that it names in 0x60A9, for
-    # one turn or 1 m of the joint; None where the user has not entered it
+    units: Units | None = None  # entered by the user; None: from the factor group
+    # turns of the shaft whose velocity the drive counts (in rpm or the angle unit of 0x60A9) per
+    # turn or 1 m of the joint; None if the user did not enter it
     rpm: float | None = None
 
     @property
     def is_drive(self) -> bool:
-        """Whether it is a CiA 402 drive."""
+        """Whether the device is a CiA 402 drive."""
         return is_drive(self.eds.dictionary)
 
     @property
     def factors(self) -> FactorGroup:
-        """The factor group by the defaults of its EDS."""
+        """The factor group from the defaults of the EDS."""
         return FactorGroup.read(self.number)
 
     @property
     def has_open_units(self) -> bool:
-        """Whether neither its EDS nor the user says how far an increment of its joint is."""
+        """Whether neither EDS nor user defines the increments per turn or metre of the joint."""
         return self.is_drive and self.units is None and not says_units(self.factors)
 
     @property
     def open_velocity(self) -> NamedUnit | None:
-        """The unit in 0x60A9, where it is not known of which shaft the velocity is; else None.
+        """The unit in 0x60A9 if the shaft of the velocity is unknown; else None.
 
-        It is of what the positions are of (CiA 402-2). Beside units that the user entered a turn
-        may be one of the motor.
+        By CiA 402-2 it is the shaft of the positions. If the user entered the position units, a
+        turn may be one of the motor.
         """
         named, units = self.factors.velocity_unit, self.units
         if named is None or units is None or self.rpm is not None or named.counts:
@@ -104,20 +104,20 @@ class NewDevice:
         return None if named.slides and units.slides else named
 
     def number(self, index: int, subindex: int = 0) -> int:
-        """Return what an object holds by the EDS; 0 where unknown."""
+        """Return an object's default in the EDS; 0 if unknown."""
         return self.eds.dictionary.number(index, subindex) or 0
 
 
 def says_units(factors: FactorGroup) -> bool:
-    """Whether a factor group says what a turn of the joint is: with its gear, and not 1 to 1."""
+    """Return whether a factor group defines a turn of the joint: has a gear, and a fine scale."""
     scale = factors.position_scale
     return factors.gear is not None and bool(scale) and not is_coarse(scale)
 
 
 def written_units(device: NewDevice) -> Units | None:
-    """Return the units that are written out; None where the master reads them from the drive.
+    """Return the units to write to bus.yml; None if the master reads them from the drive.
 
-    What an EDS names in 0x60A8 does not count: it is a default that the maker changes by
+    The unit in the EDS's 0x60A8 is ignored: it is a default that manufacturers change by
     parameters.
     """
     factors = device.factors
@@ -128,7 +128,7 @@ def written_units(device: NewDevice) -> Units | None:
 
 
 def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
-    """Return the scale of velocities, and who says it."""
+    """Return the velocity scale, and its source as text."""
     one = '1 m' if units.slides else 'one turn'
     if (named := device.open_velocity) is not None:
         raise NewBusError(
@@ -157,10 +157,10 @@ def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
 
 
 def contradiction(device: NewDevice) -> str:
-    """Return what to look at where an entry has far more than the factor group; else nothing.
+    """Return a warning if the entered scale far exceeds the factor group's; else an empty text.
 
-    It may differ by a gear that the drive does not know; where it is far less, the check of the
-    file warns.
+    They may differ by a gear that the drive does not know; if the entry is far less, the check
+    of the file warns.
     """
     factors, units = device.factors, device.units
     if units is None or units.slides or not says_units(factors):
@@ -174,13 +174,13 @@ def contradiction(device: NewDevice) -> str:
 
 
 BEST_FIRST = POSITION_MODES[::-1]
-"""Modes for arms, the best one first: set-points of each cycle, else moves of the drive's own."""
-HEARTBEAT_MS = 1000  # time between two heartbeats of a device in [ms]
+"""Modes for arms, the best first: cyclic set-points, else profiles of the drive."""
+HEARTBEAT_MS = 1000  # heartbeat period of a device in [ms]
 
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """An object for a PDO, and what a drive without it there lacks; empty where it does not."""
+    """An object to map to a PDO, and what fails without it; empty if optional."""
 
     index: int
     subindex: int = 0
@@ -197,10 +197,10 @@ FEEDBACK = (
 
 
 def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
-    """Return a bus.yml of one or more devices; SYNC is sent each period_ms [ms].
+    """Return the text of a bus.yml for one or more devices, with SYNC period_ms in [ms].
 
     Raises:
-        NewBusError: A name or node id is there twice, or an EDS does not say what is needed.
+        NewBusError: A name or node id is duplicate, or an EDS lacks required data.
     """
     for what, values in (
         ('name', [device.name for device in devices]),
@@ -233,7 +233,7 @@ def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
 
 
 def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
-    """Write what devices with the same EDS have in common."""
+    """Yield the lines that devices with the same EDS share."""
     dictionary = device.eds.dictionary
     yield f'dcf: {json.dumps(device.eds.path.name)}'
     kind = 'Cia402Driver' if device.is_drive else 'ProxyDriver'
@@ -318,7 +318,7 @@ def _units(device: NewDevice) -> Iterator[str]:
     elif says_units(factors):
         turn = factors.position_scale * TURN
         yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by the EDS'
-        if factors.acceleration_ratio is None:  # else it is read from the drive, too
+        if factors.acceleration_ratio is None:  # else also read from the drive
             yield _acceleration(device, factors.velocity_scale)
     else:
         raise NewBusError(
@@ -330,7 +330,7 @@ def _units(device: NewDevice) -> Iterator[str]:
 
 
 def _acceleration(device: NewDevice, velocity: float) -> str:
-    """Write the scale of accelerations, by that of velocities."""
+    """Return the line of the acceleration scale, from the velocity scale."""
     ratio, objects = device.factors.acceleration_ratio, device.factors.acceleration_objects
     why = 'velocity units per second, where the manual says nothing else for 0x6083'
     if ratio is not None:
@@ -339,7 +339,7 @@ def _acceleration(device: NewDevice, velocity: float) -> str:
 
 
 def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:
-    """Write the PDOs of a direction: as few as hold the objects, the others off."""
+    """Yield the lines of a direction's PDOs: as few as hold the objects, the others disabled."""
     placed, left_out = _placed(device, direction, wanted)
     yield f'{direction.name}:'
     yield from left_out
@@ -359,7 +359,7 @@ def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) ->
 def _placed(
     device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]
 ) -> tuple[dict[int, list[ObjectEntry]], list[str]]:
-    """Return what each PDO carries, by its number, and lines on what is left out."""
+    """Return the objects of each PDO by number, and comment lines on omitted ones."""
     dictionary = device.eds.dictionary
     numbers = direction.numbers(dictionary)
     free = [number for number in numbers if not is_fixed(direction, number, dictionary)]

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What several verbs share: arguments, ROS arguments without ROS, and output to the terminal.
+"""Code shared by several verbs: arguments, ROS arguments without ROS, and terminal output.
 
-Results go to stdout, warnings to stderr. The grammar of ROS arguments is that of ``--ros-args`` up
-to ``--`` or the end (ROS 2 design, "ROS command line arguments"). Parameters are read, everything
-else that ROS knows is taken and means nothing.
+Results go to stdout, warnings to stderr. ROS arguments are those from ``--ros-args`` to ``--`` or
+the end (ROS 2 design, "ROS command line arguments"). Parameters are read; all other ROS arguments
+are accepted and ignored.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
 
 
 class UsageError(CanopenError):
-    """The command line names something that does not exist; nothing was sent yet."""
+    """The command line is wrong; nothing has been sent."""
 
 
 class StrictParser(argparse.ArgumentParser):
-    """Takes options by their whole names only, and so do its sub-parsers."""
+    """Accepts unabbreviated options only, also in its sub-parsers."""
 
-    def __init__(self, **settings: Any) -> None:  # noqa: ANN401  # those of argparse
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401  # settings of argparse
         super().__init__(**settings, allow_abbrev=False)
 
 
@@ -41,7 +41,7 @@ BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1
 
 
 def bitrate(text: str) -> int:
-    """Read a bit rate in [bit/s]; ``k`` and ``M`` behind a number are thousands and millions."""
+    """Read a bit rate in [bit/s]; suffixes ``k`` and ``M`` mean thousands and millions."""
     factors = {'k': 1000, 'M': 1_000_000}
     factor = factors.get(text[-1:], 1)
     digits = text[:-1] if factor > 1 else text
@@ -77,7 +77,7 @@ def seconds(text: str) -> float:
 
 
 def add_bus_argument(parser: argparse.ArgumentParser) -> None:
-    """Add what names a bus."""
+    """Add the argument that selects a bus."""
     parser.add_argument(
         '--can',
         metavar='BUS',
@@ -87,7 +87,7 @@ def add_bus_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what names a bus and its devices."""
+    """Add the arguments that select a bus and its bus.yml."""
     add_bus_argument(parser)
     parser.add_argument(
         '--bus-config',
@@ -97,7 +97,7 @@ def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_node_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what names a device of a bus."""
+    """Add the arguments that select a device."""
     parser.add_argument(
         'node', metavar='NODE', help='node id, or name of a device of --bus-config'
     )
@@ -114,7 +114,7 @@ def add_node_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def apply_parameters(options: argparse.Namespace, parameters: Mapping[str, str]) -> None:
-    """Fill options that were not given from ROS parameters of the names that the nodes have."""
+    """Fill missing options from ROS parameters, under the names that our nodes use."""
     if 'can' in options:
         options.can = options.can or parameters.get('can_interface_name') or 'auto'
     if 'bus_config' in options:
@@ -130,7 +130,7 @@ def print_line(text: str = '') -> None:
 
 
 def warn(text: str) -> None:
-    """Write a line for a person, beside the result."""
+    """Write a line for the user to stderr."""
     with suppress(BrokenPipeError):
         sys.stdout.flush()
         sys.stderr.write(f'canopen: {text}\n')
@@ -138,7 +138,7 @@ def warn(text: str) -> None:
 
 
 def print_problem(problem: Problem, kind: str, color: str) -> None:
-    """Write a problem as compilers do, its remedy in the line below."""
+    """Write a problem in compiler style, its remedy on the next line."""
     place = f'{problem.file}:{problem.line}' if problem.line else str(problem.file)
     key = f'{problem.key}: ' if problem.key else ''
     print_line(f'{place}: {painted(kind, color)}: {key}{problem.message}')
@@ -147,14 +147,14 @@ def print_problem(problem: Problem, kind: str, color: str) -> None:
 
 
 def painted(text: str, color: str) -> str:
-    """Return a text in colour, when a person looks at it."""
+    """Return a text, coloured on a terminal."""
     if not sys.stdout.isatty() or 'NO_COLOR' in os.environ:
         return text
     return f'{color}{text}{RESET}'
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '') -> None:
-    """Write a table; right names the columns that are flush right, separated by commas."""
+    """Write a table; right lists the right-aligned columns, separated by commas."""
     flush_right = set(right.split(','))
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     for row in (head, *rows):
@@ -177,10 +177,10 @@ _WITH_VALUE = frozenset(
 
 
 def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Split a command line: what is not for ROS, and values of ``-p name:=value`` by name.
+    """Split a command line into non-ROS arguments and ``-p name:=value`` parameters by name.
 
     Raises:
-        ValueError: A parameter has no value, or an option nothing behind it.
+        ValueError: A parameter has no value, or an option no argument.
     """
     own: list[str] = []
     parameters: dict[str, str] = {}
@@ -198,5 +198,5 @@ def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], dict[str, str]]
             if word in _PARAMETER and not (name and assigned):
                 raise ValueError(f'{value!r} is not a parameter; write name:=value')
             if word in _PARAMETER:
-                parameters[name.rpartition(':')[2]] = text  # without the node's name before it
+                parameters[name.rpartition(':')[2]] = text  # without the node name
     return own, parameters

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen check BUS.yml`` and ``canopen eds FILE``: what is wrong with files."""
+"""``canopen check BUS.yml`` and ``canopen eds FILE``: check files."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ MOTION_TITLES = {
     Index.PROFILE_DECELERATION: 'deceleration',
     Index.QUICK_STOP_DECELERATION: 'quick stop',
 }
-"""Titles of columns; the values are in the units of bus.yml."""
+"""Column titles; the values are in the units of bus.yml."""
 
 
 def add_check(parsers: SubParsers) -> None:
@@ -76,9 +76,9 @@ def run(options: argparse.Namespace) -> int:
 def show_check(
     path: Path, bit_rate: int | None = None, *, strict: bool = False, frames: bool = False
 ) -> int:
-    """Show what is wrong with a bus.yml, and with frames the load of each; return the exit code.
+    """Check a bus.yml, and print problems and bus load; return the exit code.
 
-    The bit rate in [bit/s] replaces that of the file. Strict makes warnings errors.
+    bit_rate in [bit/s] overrides the file; strict makes warnings errors; frames lists each frame.
     """
     report = check_file(path, bit_rate)
     _print_problems(report)
@@ -130,21 +130,21 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
 
 
 def _acceleration(axis: AxisUnits) -> str:
-    """Return the scale of accelerations, with who says it where bus.yml does not."""
-    assumed = 'default' if axis.rule is UnitRule.UPSTREAM else 'assumed'  # with a warning
+    """Return the acceleration scale, with its source if that is not bus.yml."""
+    assumed = 'default' if axis.rule is UnitRule.UPSTREAM else 'assumed'  # there is a warning
     by = axis.acceleration_by or assumed
     return f'{axis.acceleration:g}' + ('' if by == ACCELERATION_KEY else f' ({by})')
 
 
 def _rule(axis: AxisUnits) -> str:
-    """Return where a scale comes from, with the objects that the EDS really has."""
+    """Return the source of a scale, with the objects that the EDS contains."""
     if axis.rule is not UnitRule.FACTOR_GROUP or not axis.factors:
         return axis.rule.value
     return f'{axis.rule.value} ({", ".join(f"0x{index:04X}" for index in axis.factors)})'
 
 
 def _print_motion(units: Sequence[AxisUnits]) -> None:
-    """Show how fast the moves of the drives' own are; a slow one looks like a drive that hangs."""
+    """Print each drive's profile velocity and accelerations; a slow drive seems to hang."""
     known = [index for index in MOTION_OBJECTS if any(index in axis.motion for axis in units)]
     if not known:
         return
@@ -173,7 +173,7 @@ def _print_load(load: LoadEstimate, *, each: bool) -> None:
 
 
 def _print_groups(load: LoadEstimate) -> None:
-    """List equal frames of several devices in one row."""
+    """Print a table with equal frames of several devices in one row."""
 
     def likeness(item: Traffic) -> tuple[str, int, str]:
         return item.service, item.size, item.reason

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen dcf BUS.yml``: files for Lely's tools, as its dcfgen writes them.
+"""``canopen dcf BUS.yml``: files for Lely's tools, as written by dcfgen.
 
 A concise DCF holds the writes that configure a device (CiA 302-3, 0x1F22): the number of writes as
-UNSIGNED32, and then for each index (UNSIGNED16), sub-index (UNSIGNED8), length of the data in
-[byte] (UNSIGNED32) and the data; all of it little-endian.
+UNSIGNED32, then for each write index (UNSIGNED16), sub-index (UNSIGNED8), data length in [byte]
+(UNSIGNED32) and data, all little-endian.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write(path: Path, writes: list[SdoWrite]) -> None:
-    """Write a concise DCF; without writes there is none, also not of an earlier run."""
+    """Write a concise DCF; without writes, remove a file of an earlier run."""
     if writes:
         path.write_bytes(encode_concise(writes))
     else:
@@ -99,12 +99,12 @@ def _show(names: ObjectNames, writes: list[SdoWrite]) -> None:
 COUNT = struct.Struct('<I')
 ENTRY = struct.Struct('<HBI')
 
-EXPECTED_REVISION = 0x1F87  # of the devices, in the master's dictionary (CiA 302-2)
+EXPECTED_REVISION = 0x1F87  # expected values of devices in the master (CiA 302-2)
 EXPECTED_SERIAL = 0x1F88
 
 
 def encode_concise(writes: Iterable[SdoWrite]) -> bytes:
-    """Return a concise DCF."""
+    """Encode writes as a concise DCF."""
     entries = [ENTRY.pack(w.index, w.subindex, len(w.data)) + w.data for w in writes]
     return COUNT.pack(len(entries)) + b''.join(entries)
 
@@ -112,10 +112,10 @@ def encode_concise(writes: Iterable[SdoWrite]) -> bytes:
 def device_writes(
     config: BusConfig, node: NodeConfig, *, complete: bool = False
 ) -> list[SdoWrite]:
-    """Return what a master writes to a device at boot, in the order of dcfgen.
+    """Return a master's writes to a device at boot, in the order of dcfgen.
 
-    Complete also writes what the EDS has as default; dcfgen leaves it out, so a device that
-    holds something else keeps it.
+    With complete they include EDS defaults; dcfgen omits those, so that a device with other
+    values keeps them.
     """
     return [
         SdoWrite(*write.address, _value(node, write))
@@ -125,7 +125,7 @@ def device_writes(
 
 
 def master_writes(config: BusConfig) -> list[SdoWrite]:
-    """Return what the master writes to its own dictionary; none makes the file unnecessary."""
+    """Return the writes to the master's own dictionary; if empty, no file is needed."""
     numbers = [(int(Index.IDENTITY), 4, config.master.identity.serial_number)]
     for node in config.nodes:
         numbers.append((EXPECTED_REVISION, node.node_id, node.identity.revision_number))
@@ -138,9 +138,9 @@ def master_writes(config: BusConfig) -> list[SdoWrite]:
 
 
 def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:
-    """Return whether dcfgen writes it: no mapping or timer of our own, and no defaults.
+    """Return whether dcfgen would write this: not our own mappings or timers, and no defaults.
 
-    Our boot tries those, and goes on where the device refuses them; another master would fail.
+    Our boot continues if a device refuses such mappings or timers; another master would fail.
     """
     pdo = pdo_object(write.index)
     is_own_mapping = pdo is not None and pdo.is_mapping and not write.requested
@@ -155,7 +155,7 @@ def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:
 
 
 def _value(node: NodeConfig, write: BootWrite) -> bytes:
-    """Return the data; what bus.yml leaves open of a COB-ID stays as the EDS has it."""
+    """Return the data; COB-ID bits that bus.yml leaves open keep the EDS value."""
     entry = _entry(node, write)
     present = entry.default if entry is not None else None
     if write.mask is None or not isinstance(present, int):
@@ -167,6 +167,6 @@ def _value(node: NodeConfig, write: BootWrite) -> bytes:
 
 
 def _entry(node: NodeConfig, write: BootWrite) -> ObjectEntry | None:
-    """Return what the EDS has; what a device has without its DCF is not known any more."""
+    """Return the entry of the EDS; None if a DCF replaced its default, which is then unknown."""
     entry = node.dictionary.get(*write.address)
     return None if entry is None or entry.configured else entry

@@ -25,15 +25,15 @@ from .objects import add_diff, add_read_and_write
 from .scan import add_scan
 
 VERBS = (add_check, add_eds, add_new, add_scan, add_read_and_write, add_diff, add_dcf)
-INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
+INTERRUPTED = 130  # exit code after Ctrl-C
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a verb.
 
     Returns:
-        Exit code: 0, 1 when something is wrong (with a file, a device or the bus), 2 for wrong
-        usage, when nothing was sent.
+        Exit code: 0 on success, 1 for a problem with a file, a device or the bus, 2 for wrong
+        usage, in which case nothing was sent.
     """
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = int(options.run(options))
         sys.stdout.flush()
     except BrokenPipeError:
-        # the interpreter flushes stdout once more when it ends
+        # the interpreter flushes stdout again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen new``: a bus.yml of EDS files, each choice with its reason."""
+"""``canopen new``: generate a bus.yml from EDS files, with a reason for each choice."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .arguments import node_id, print_line, SubParsers, UsageError
 from .check import show_check
 
 DEVICE = re.compile('(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
-PERIOD_MS = 10  # time between two SYNC in [ms]
-# what a person writes for a turn or a metre of the joint, and for its gear
+PERIOD_MS = 10  # SYNC period in [ms]
+# options for the increments per turn or metre of the joint, and for its gear
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
 TURNS = 'turns of the motor for one of the joint, a number above 0 (without sign) such as 100'
 OPTIONS = {
@@ -47,7 +47,7 @@ OPTIONS = {
         '1, 7 or 8: mode of operation of a drive (default: the best one that 0x6502 names)',
     ),
 }
-"""What is said of a drive by its name: the value, and the help."""
+"""Options for a drive by name: value placeholder and help text."""
 
 
 def add_new(parsers: SubParsers) -> None:
@@ -113,7 +113,7 @@ def _write(devices: Sequence[NewDevice], text: str, output: Path) -> None:
 
 
 def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> list[NewDevice]:
-    """Return the devices with the units and modes of the command line."""
+    """Return the devices with units and modes from the command line."""
     drives = [device.name for device in devices if device.is_drive]
     units = {
         name: _units(option, _number(option, value, name))
@@ -171,7 +171,7 @@ def _mode(name: str, text: str) -> OperationMode:
 
 
 def _asked(device: NewDevice) -> NewDevice:
-    """Ask at the terminal for what nothing says of a drive; a script learns what to give."""
+    """Prompt on a terminal for unknown units of a drive; return it unchanged in a script."""
     if not sys.stdin.isatty():
         return device
     if device.has_open_units:
@@ -191,7 +191,7 @@ def _asked(device: NewDevice) -> NewDevice:
 
 
 def _answer(option: str, device: NewDevice, question: str, options: str) -> float:
-    """Ask until the answer is a number that the option takes."""
+    """Prompt until the answer is a valid number for the option."""
     while True:
         try:
             answer = input(f'{device.name}: {question}: ').strip()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen read``, ``write`` and ``diff``: the objects of a device, and what its files say."""
+"""``canopen read``, ``write`` and ``diff``: read, write and compare a device's objects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SHORT_TYPES: dict[str | None, DataType] = {
 LONG_TYPES = frozenset({DataType.DOMAIN, DataType.VISIBLE_STRING, DataType.OCTET_STRING})
 
 COMMANDS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
-"""Objects that return something else than what is written to them (CiA 301, 7.5.2.13)."""
+"""Objects that do not read back the written value (CiA 301, 7.5.2.13)."""
 
 
 def add_read_and_write(parsers: SubParsers) -> None:
@@ -114,7 +114,7 @@ def write(options: argparse.Namespace) -> int:
             return 0
         try:
             held = _read_entry(session, target, entry)
-        except SdoAbortError as error:  # commands, and what restarts the device
+        except SdoAbortError as error:  # commands, and objects that restart the device
             print_line(f'{title} was written')
             warn(f'it cannot be read back: {error}')
             return 0
@@ -143,7 +143,7 @@ def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> by
 
 def _read_entry(session: Session, target: Target, entry: ObjectEntry) -> bytes:
     data = _read(session, target, *entry.address, block=entry.data_type in LONG_TYPES)
-    return sdo.fitted(entry.data_type, data)  # of the type that --type names
+    return sdo.fitted(entry.data_type, data)  # with the type of --type
 
 
 def _title(target: Target, entry: ObjectEntry) -> str:
@@ -163,7 +163,7 @@ def _plain(entry: ObjectEntry, data: bytes) -> str:
 
 
 FROM_EDS = ('device_type', 'vendor_id', 'product_code')
-"""The identity that the EDS has; the rest is in bus.yml."""
+"""Identity attributes from the EDS; the others are in bus.yml."""
 
 
 def add_diff(parsers: SubParsers) -> None:
@@ -183,7 +183,7 @@ def add_diff(parsers: SubParsers) -> None:
 def diff(options: argparse.Namespace) -> int:
     """Compare a device; return the exit code."""
     target = find_target(options)
-    _objects(target, {})  # what cannot be is reported before the bus opens
+    _objects(target, {})  # report errors before the bus opens
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
@@ -199,7 +199,7 @@ def diff(options: argparse.Namespace) -> int:
 
 
 def _consumers(session: Session, target: Target) -> HeldConsumers:
-    """Return what the device has in the entries of 0x1016 of which boot takes one."""
+    """Read the entries of 0x1016 among which boot would choose, by sub-index."""
     held: dict[int, int | None] = {}
     if target.bus is None or target.config is None:
         return held
@@ -212,7 +212,7 @@ def _consumers(session: Session, target: Target) -> HeldConsumers:
 
 
 def _objects(target: Target, consumers: HeldConsumers) -> list[BootWrite]:
-    """Return what to compare; consumers are what the device has in 0x1016, by sub-index."""
+    """Return what to compare; consumers are the device's 0x1016 values by sub-index."""
     if target.bus is not None and target.config is not None:
         return expected_objects(target.bus, target.config, consumers)
     if not target.described:
@@ -226,15 +226,15 @@ def _objects(target: Target, consumers: HeldConsumers) -> list[BootWrite]:
 def expected_objects(
     config: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
-    """Return everything that bus.yml decides of a device: its identity, and what boot leaves.
+    """Return all objects that bus.yml determines: identity, and values after boot.
 
-    Consumers are what the device has in 0x1016, by sub-index; None: those of its EDS.
+    consumers are the device's 0x1016 values by sub-index; None uses those of its EDS.
     """
     return [*_identity(node), *held_after_boot(config, node, consumers)]
 
 
 def expected_defaults(dictionary: ObjectDictionary) -> Iterator[BootWrite]:
-    """Yield what every object that can be read and written holds by its EDS."""
+    """Yield the EDS default of every readable and writable object."""
     for entry in dictionary:
         if entry.default is None or not (entry.access.readable and entry.access.writable):
             continue
@@ -261,7 +261,7 @@ def _read(
 
 
 def _compared(session: Session, target: Target, expected: BootWrite) -> tuple[str, ...]:
-    """Return the row of an object: whether it is equal, what it should hold, and what it holds."""
+    """Compare an object; return its table row: mark, title, expected and actual value, source."""
     try:
         data = _read(session, target, expected.index, expected.subindex)
     except SdoAbortError as error:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen scan``: who is on the bus."""
+"""``canopen scan``: find and identify the devices on a bus."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from .arguments import (
 )
 from .target import Session
 
-LISTEN = 1.5  # [s] many devices send a heartbeat each second
+LISTEN = 1.5  # [s] many devices send a heartbeat every second
 ANSWER = 0.3  # [s]
-SECOND_ANSWER = 0.02  # [s] for that of another device with the same node id
-GROUP = 8  # devices that are queried at a time, so that no transmit queue fills up
+SECOND_ANSWER = 0.02  # [s] for the answer of a second device with the same node id
+GROUP = 8  # devices queried at once, so that no transmit queue overflows
 GROUP_PAUSE = 0.01  # [s]
 
 TITLES = ('device type', 'vendor', 'product', 'revision', 'serial')
-"""Of the columns for IDENTITY_OBJECTS."""
+"""Column titles of IDENTITY_OBJECTS."""
 
 PROFILES: dict[int, str] = {
     301: '',
@@ -62,17 +62,17 @@ class Found:
     """A device that has sent a frame or answered."""
 
     node_id: int
-    state: NmtState | None = None  # NMT state of its heartbeat, None when it sends no heartbeat
-    # its identity, by attribute of Identity; None where it refuses
+    state: NmtState | None = None  # from its heartbeat; None without heartbeat
+    # identity by attribute of Identity; None if the device refuses to read it
     numbers: dict[str, int | None] = field(default_factory=dict)
     config: NodeConfig | None = None  # its entry in bus.yml
-    answers: bool = False  # it has answered an SDO
-    # more answers came than it was asked for, so another device has its node id
+    answers: bool = False  # whether it has answered an SDO
+    # more answers than requests: another device has the same node id
     twice: bool = False
 
     @property
     def is_there(self) -> bool:
-        """It has sent a frame or answered."""
+        """Whether the device has sent a frame or answered."""
         return self.state is not None or self.answers
 
 
@@ -115,12 +115,12 @@ def run(options: argparse.Namespace) -> int:
 def find_devices(
     session: Session, config: BusConfig | None, listen: float, *, query: bool
 ) -> dict[int, Found]:
-    """Listen for some [s], then read the identity of every node id where that disturbs no master.
+    """Listen for ``listen`` [s], then read the identity of every node id, if no master is there.
 
-    Query reads beside a master, too.
+    query reads even if a master is on the bus.
 
     Returns:
-        Devices by node id: those that are there, and those of the configuration.
+        Devices by node id: those found, and those of the configuration.
     """
     warn(f'listening on {session.bus.name} for {listen:g} s')
     session.listen(listen)
@@ -165,7 +165,7 @@ def _may_query(session: Session, *, query: bool) -> bool:
 
 
 def _find_silent(session: Session, found: dict[int, Found]) -> None:
-    """Read 0x1000 of every other node id; devices without heartbeat are found by their answer."""
+    """Read 0x1000 of every other node id, to find devices without heartbeat."""
     answered: set[int] = set()
 
     def note(frame: Frame) -> None:
@@ -189,13 +189,13 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
 
 
 def _identify(session: Session, device: Found) -> None:
-    """Read 0x1000 and 0x1018 of a device that is there."""
+    """Read 0x1000 and 0x1018 of a device that was found."""
     if not device.is_there:
         return
     client = session.client(device.node_id)
     _read_identity(session, device, client)
     session.listen(SECOND_ANSWER)
-    device.twice = client.counters.doubled > 1  # the bus may bring one frame twice
+    device.twice = client.counters.doubled > 1  # the bus may deliver one frame twice
 
 
 def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
@@ -205,9 +205,9 @@ def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
         try:
             data = session.read(client, index, subindex, ANSWER)
         except TimeoutError:
-            return  # it will not answer the others either
+            return  # it will not answer further reads
         except SdoError:
-            device.numbers[attribute] = None  # not every device has all of them
+            device.numbers[attribute] = None  # some are optional
         else:
             device.answers = True
             device.numbers[attribute] = int.from_bytes(data, 'little')

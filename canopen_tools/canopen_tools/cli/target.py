@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A connection to a bus for as long as a verb runs, and the device that the verb is about.
+"""The bus session of one verb, and the device on which the verb acts.
 
-One loop, one thread, no background. Beside a running master it only listens, unless `--query` is
-given: a device has one SDO channel by default, which belongs to the master (CiA 301, 7.2.4.1).
+It runs in one loop and thread. While a master is on the bus it only listens, unless `--query` is
+given: a device has one default SDO channel, which belongs to the master (CiA 301, 7.2.4.1).
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ from .arguments import UsageError, warn
 T = TypeVar('T')
 
 IDLE_WAIT = 0.1  # [s] longest wait for frames when nothing else is due
-QUIET = 0.02  # [s] without SDO frames, after which a transfer of another client counts as ended
-QUIET_WAIT = 2.0  # [s]
+QUIET = 0.02  # [s] without SDO frames after which another client's transfer has ended
+QUIET_WAIT = 2.0  # [s] longest wait for this
 
 
 class Session:
     """Listens to a bus and runs coroutines on it."""
 
     def __init__(self, bus: Bus, config: BusConfig | None = None) -> None:
-        """Begin to listen; the configuration helps to know a master by its frames."""
+        """Start listening; the configuration helps to recognize a master by its frames."""
         self.bus = bus
         self.scheduler = Scheduler(monotonic())
         self.states: dict[int, NmtState] = {}  # NMT states by node id, from their heartbeats
@@ -60,13 +60,13 @@ class Session:
         self._master_frames = MasterFrames(config)
 
     def listen(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
-        """Listen for a time in [s], or until a condition holds."""
+        """Listen for a duration in [s], or until a condition holds."""
         end = monotonic() + duration
         while not until() and (left := end - monotonic()) > 0.0:
             self._step(left)
 
     def run(self, coroutine: Coroutine[Promise[Any], None, T]) -> T:
-        """Run a coroutine to its end; returns its result or raises its error."""
+        """Run a coroutine to its end; return its result or raise its error."""
         self.scheduler.advance(monotonic())
         task = self.scheduler.spawn(coroutine)
         while not task.done:
@@ -76,7 +76,7 @@ class Session:
     def client(
         self, node_id: int, name: str = '', dictionary: ObjectDictionary | None = None
     ) -> SdoClient:
-        """Return the SDO client for a device whose objects are of these types."""
+        """Return the SDO client of a device; ``dictionary`` has its object types."""
         client = self._clients.get(node_id)
         if client is None:
             name = name or f'node {node_id}'
@@ -102,7 +102,7 @@ class Session:
         return self.run(upload())
 
     def await_quiet(self, node_id: int) -> None:
-        """Wait until no one else talks to the SDO server of a device, for a while at most."""
+        """Wait until other clients' SDO transfers with a device pause, at most ``QUIET_WAIT``."""
         self._step(0.0)
         self.listen(QUIET_WAIT, lambda: monotonic() - self._sdo_times.get(node_id, 0.0) > QUIET)
 
@@ -135,7 +135,7 @@ class Session:
             self._clients[node_id].receive(frame)
 
     def _note_master(self, frame: Frame, function: int, node_id: int) -> None:
-        """Note what only a master sends; own frames never arrive here."""
+        """Record frames that only a master sends; own frames are not received."""
         kind = self._master_frames.read(frame)
         if kind is not None:
             self.masters.add(kind.evidence.title)
@@ -151,19 +151,19 @@ LISTEN = 0.15  # [s] before the first request; a master sends SYNC more often
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A device."""
+    """The device on which a verb acts."""
 
     node_id: int
     name: str  # its name in bus.yml, else ``the device``
-    dictionary: ObjectDictionary  # its objects; without a file what the standards describe
-    described: bool  # a file describes them
-    timeout: float  # longest time for an answer in [s]
-    bus: BusConfig | None = None  # the bus, None without bus.yml
-    config: NodeConfig | None = None  # the device in bus.yml, None when it is not there
-    given_timeout: bool = False  # it was given on the command line, and counts for every object
+    dictionary: ObjectDictionary  # its objects; without a file those of the standards
+    described: bool  # whether a file describes them
+    timeout: float  # SDO timeout in [s]
+    bus: BusConfig | None = None  # None without bus.yml
+    config: NodeConfig | None = None  # its entry in bus.yml; None if missing
+    given_timeout: bool = False  # from the command line, so it applies to every object
 
     def write_timeout(self, entry: ObjectEntry) -> float:
-        """Return the longest time for the answer to a write in [s]."""
+        """Return the SDO timeout of a write in [s]."""
         if self.given_timeout:
             return self.timeout
         if self.config is not None:
@@ -171,10 +171,10 @@ class Target:
         return slow_timeout(entry.index, self.timeout)
 
     def entry(self, path: str, data_type: DataType | None = None) -> ObjectEntry:
-        """Find an object by a path, as :func:`.find_object` does; with a type it needs no file.
+        """Find an object by a path, as :func:`.find_object`; with a type no file is needed.
 
         Raises:
-            UsageError: There is none; the message names similar ones.
+            UsageError: The object does not exist; the message names similar ones.
         """
         number = NUMBER.fullmatch(path.strip())
         if number is not None and data_type is not None:
@@ -199,16 +199,16 @@ class Target:
 
 @cache
 def standard_dictionary() -> ObjectDictionary:
-    """Return the objects of a drive by the standards, for devices without a file."""
+    """Return a drive's standard objects, for devices without a file."""
     source = 'the objects of CiA 301 and 402 (no EDS is given)'
     return ObjectDictionary(load_eds(DEFAULT_DRIVE).dictionary, source=source)
 
 
 def find_target(options: argparse.Namespace) -> Target:
-    """Find the device that the command line means.
+    """Find the device named on the command line.
 
     Raises:
-        UsageError: There is none.
+        UsageError: The device does not exist.
         ConfigError: A file is wrong.
     """
     bus = load_bus(options.bus_config) if options.bus_config else None
@@ -246,7 +246,7 @@ def _node(text: str, bus: BusConfig | None) -> tuple[int, NodeConfig | None]:
 
 
 def warn_of_master(session: Session, target: Target) -> None:
-    """Listen for a master, and wait for a pause in its transfers with a device."""
+    """Warn if a master is on the bus, and wait for a pause in its transfers with a device."""
     session.listen(LISTEN)
     if session.masters:
         signs = ', '.join(sorted(session.masters))

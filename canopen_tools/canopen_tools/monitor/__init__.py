@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frames in words: what each one on a CANopen bus means."""
+"""Decodes the frames of a CANopen bus into text."""
 
 from .describe import Description, FrameDescriber, FrameFilter, FrameKind
 

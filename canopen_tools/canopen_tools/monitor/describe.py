@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Describes the frames of a bus, by the names in its bus.yml and EDS files, and filters them."""
+"""Describes frames of a bus with names from bus.yml and EDS files, and filters them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .sdo_follower import ObjectNames, SdoFollower, value_text
 
 
 class FrameKind(Enum):
-    """Services of CANopen (CiA 301, 7.2; CiA 305), and what is none of them."""
+    """Services of CANopen (CiA 301, 7.2; CiA 305), and other kinds of frames."""
 
     NMT = 'nmt'
     SYNC = 'sync'
@@ -51,16 +51,15 @@ class Description:
     """What a frame means."""
 
     kind: FrameKind  # its service
-    # The service as a person writes it, e.g. ``TPDO1``; ``SDO >`` goes to the device and ``SDO <``
-    # comes from it.
+    # Name of the service, e.g. ``TPDO1``; ``SDO >`` goes to the device, ``SDO <`` comes from it.
     label: str
-    node: str = ''  # name of the device it comes from or goes to, empty when it is for all
-    text: str = ''  # the content in words, empty when there is nothing to add
-    is_alert: bool = False  # it reports something wrong: an emergency, an abort, an error
-    node_id: int = 0  # id of the device, 0 when it is for all
+    node: str = ''  # device that sends or receives the frame; empty for all
+    text: str = ''  # decoded content; empty if there is nothing to add
+    is_alert: bool = False  # whether it is an emergency, an abort or an error
+    node_id: int = 0  # of that device; 0 for all
 
     def __str__(self) -> str:
-        """Write it in one line."""
+        """Return the description as one line."""
         head = f'{self.label} {self.node}'.rstrip()
         return f'{head}  {self.text}' if self.text else head
 
@@ -72,27 +71,27 @@ _NOT = '^'
 
 
 class FrameFilter:
-    """Shows frames that fit one of its terms, and none that fits a term with ``^`` before it.
+    """Selects frames that match one of its terms, but none with a prefix ``^``.
 
     =====================  ==================================================================
     ``sdo``, ``emcy`` ...   a service, by the names of :class:`FrameKind`
     ``node:panda_joint1``  a device by name, or by number as in ``node:2``
-    ``181``, ``180:780``   an identifier in hexadecimal, with a mask behind the colon
+    ``181``, ``180:780``   an identifier in hexadecimal, with a mask after the colon
     =====================  ==================================================================
     """
 
     def __init__(self, terms: Sequence[str] = ()) -> None:
-        """Read terms of the table above; several may stand in one, with commas.
+        """Parse terms of the table above; a string may contain several, separated by commas.
 
         Raises:
-            ValueError: A term is none of these.
+            ValueError: A term is invalid.
         """
         words = [word.strip() for term in terms for word in term.split(',') if word.strip()]
         self._wanted = [_test(word) for word in words if not word.startswith(_NOT)]
         self._unwanted = [_test(word[1:]) for word in words if word.startswith(_NOT)]
 
     def shows(self, frame: Frame, description: Description) -> bool:
-        """Return whether a frame is to be shown."""
+        """Return whether a frame passes the filter."""
         if any(test(frame, description) for test in self._unwanted):
             return False
         return not self._wanted or any(test(frame, description) for test in self._wanted)
@@ -129,14 +128,14 @@ _PDO_FUNCTIONS: dict[int, str] = {
 
 
 class FrameDescriber:
-    """Puts frames into words, in the order in which they were on the bus.
+    """Describes frames as text; call it with frames in bus order.
 
-    It remembers SDO transfers, so that segments are shown with their object and the value as a
-    whole. COB-IDs that bus.yml assigns count before those of the pre-defined connection set.
+    It tracks SDO transfers, so that segments are shown with their object and the whole value.
+    COB-IDs from bus.yml take precedence over those of the pre-defined connection set.
     """
 
     def __init__(self, config: BusConfig | None = None) -> None:
-        """Prepare for a bus; without it devices have numbers and PDOs no objects."""
+        """Load names of a bus; without config, devices have numbers and PDOs no objects."""
         self._names: dict[int, str] = {}
         self._objects: dict[int, ObjectNames] = {}
         self._sdo: dict[int, SdoFollower] = {}
@@ -170,7 +169,7 @@ class FrameDescriber:
                     self._handlers[pdo.cob_id] = _pdo(f'{prefix}{pdo.number}', node, pdo, names)
 
     def describe(self, frame: Frame) -> Description:
-        """Return what a frame means; unknown ones are shown as such, and none is an error."""
+        """Return the meaning of a frame; never raises for unknown frames."""
         if frame.is_error:
             return Description(FrameKind.ERROR, 'CAN error', '', error_text(frame), is_alert=True)
         if frame.is_extended:
@@ -181,7 +180,7 @@ class FrameDescriber:
         return handler(frame) if handler else self._by_function(frame)
 
     def node_name(self, node_id: int) -> str:
-        """Return the name of a device, or its number when it has none."""
+        """Return the name of a device, or its number without a name."""
         return self._names.get(node_id) or f'node {node_id}'
 
     def _by_function(self, frame: Frame) -> Description:
@@ -196,7 +195,7 @@ class FrameDescriber:
         return Description(FrameKind.OTHER, 'unknown')
 
     def _request(self, frame: Frame) -> Description:
-        """Describe a remote request by what an answer would be."""
+        """Describe a remote request by the requested frame."""
         node_id, code = frame.can_id & _NODE_MASK, frame.can_id & _FUNCTION_MASK
         if code == CobId.HEARTBEAT and node_id:
             node = self.node_name(node_id)
@@ -270,13 +269,13 @@ class FrameDescriber:
 
 
 def _cob_id(node: NodeConfig, index: Index) -> int | None:
-    """Return the COB-ID that the EDS gives a service, None when it gives none."""
+    """Return the EDS default COB-ID of a service; None without one."""
     value = node.dictionary.number(index)
     return None if value is None or value & COB_ID_INVALID else value & CAN_ID_MASK or None
 
 
 def _pdo(label: str, node: NodeConfig, pdo: PdoConfig, names: ObjectNames) -> _Handler:
-    """Return what names the objects of a PDO with their values; the label is like ``TPDO1``."""
+    """Return a handler that lists a PDO's objects and values; label is e.g. ``TPDO1``."""
     codec = PdoCodec(pdo.mapping)
     titles = [
         names.name(entry.index, entry.subindex) or object_address(entry.index, entry.subindex)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Objects, their values and SDO transfers as a person reads them.
+"""Text for objects, their values and SDO transfers.
 
-Transfers are followed, so that segments and answers are shown with the object (CiA 301, 7.2.4.3).
-A device has one default SDO channel, so one transfer is on at a time.
+Transfers are tracked, so that segments and answers are shown with the object (CiA 301, 7.2.4.3).
+A device has one default SDO channel, so only one transfer runs at a time.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ _STANDARD_NAMES: dict[int, str] = {
 
 
 class ObjectNames:
-    """What is known of the objects of one device."""
+    """Names and types of the objects of one device."""
 
     def __init__(self, dictionary: ObjectDictionary | None = None) -> None:
-        """Read names from a dictionary, without one from the standard."""
+        """Use names from a dictionary; without one those of the standard."""
         self._dictionary = dictionary
 
     def name(self, index: int, subindex: int) -> str:
-        """Return the name of an object, empty when it has none."""
+        """Return the name of an object; empty if unknown."""
         entry = self._dictionary.get(index, subindex) if self._dictionary else None
         return entry.name if entry else _standard_name(index)
 
@@ -56,7 +56,7 @@ class ObjectNames:
         return f'{object_address(index, subindex)} {self.name(index, subindex)}'.rstrip()
 
     def data_type(self, index: int, subindex: int) -> DataType | None:
-        """Return the type of an object, None when it is unknown."""
+        """Return the type of an object; None if unknown."""
         entry = self._dictionary.get(index, subindex) if self._dictionary else None
         return entry.data_type if entry else None
 
@@ -76,7 +76,7 @@ CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
     (0x0F, 0x07, 'Switch on'),
     (0x0F, 0x0F, 'Enable operation'),
 )
-"""Mask, value and command; the first that fits counts (CiA 402-2, table 26)."""
+"""Mask, value and command; the first match applies (CiA 402-2, table 26)."""
 
 _SIGNED_TYPES = {1: DataType.INTEGER8, 2: DataType.INTEGER16, 4: DataType.INTEGER32}
 _UNSIGNED_TYPES = {1: DataType.UNSIGNED8, 2: DataType.UNSIGNED16, 4: DataType.UNSIGNED32}
@@ -93,13 +93,13 @@ _SIGNED_OBJECTS = frozenset(
         Index.FOLLOWING_ERROR,
     }
 )
-"""Signed objects beside targets and actual values, for when there is no EDS (CiA 402-2)."""
+"""Signed objects other than targets and actual values, used without EDS (CiA 402-2)."""
 
-_COB_ID_SUBINDEX = 1  # of a PDO communication parameter (CiA 301, 7.5.2.35)
+_COB_ID_SUBINDEX = 1  # in PDO communication parameters (CiA 301, 7.5.2.35)
 
 
 def controlword_text(word: int) -> str:
-    """Return a controlword in words: its command, halt, and the bits that depend on the mode."""
+    """Return a controlword as text: its command, halt, and mode-specific bits."""
     command = next(
         (text for mask, value, text in CONTROLWORD_COMMANDS if word & mask == value), ''
     )
@@ -152,11 +152,11 @@ _RECORD_TEXTS: dict[int, Callable[[int], str]] = {
 
 
 def value_text(index: int, subindex: int, value: Value) -> str:
-    """Write a decoded value as a person reads it."""
+    """Format a decoded value as text."""
     if isinstance(value, bytes):
         return value.hex(' ') or 'nothing'
     if isinstance(value, str):
-        # escape what would break the line or steer the terminal; devices may send anything
+        # escape line breaks and terminal control codes; devices may send anything
         text = value.rstrip(chr(0))
         shown = (c if c.isprintable() else c.encode('unicode_escape').decode() for c in text)
         return f'"{"".join(shown)}"'
@@ -176,9 +176,9 @@ def _text_of(index: int, subindex: int) -> Callable[[int], str] | None:
 
 
 def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes) -> str:
-    """Write the bytes of an SDO as a person reads them; expedited ones may exceed their type.
+    """Format the bytes of an SDO as text; expedited data may be longer than their type.
 
-    The type by the EDS is None when it is unknown.
+    data_type is None if the EDS does not have the object.
     """
     if data_type is None:
         signed = index in _SIGNED_OBJECTS or is_signed(index, subindex)
@@ -193,34 +193,34 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
 
 
 _BLOCK_SENDER, _BLOCK_RECEIVER = 6, 5  # command specifiers of the sides of a block transfer
-_ABORT = 0x80  # as a segment of a block it would have number 0, which there is not
+_ABORT = 0x80  # no segment: their numbers start at 1
 _LAST = 0x80
 _FRAME_SIZE = 8  # [byte]
 
 
 @dataclass(frozen=True, slots=True)
 class SdoText:
-    """A frame of a transfer in words."""
+    """Text for one frame of a transfer."""
 
     text: str  # the words
-    is_abort: bool = False  # one side ended the transfer
+    is_abort: bool = False  # one side aborted the transfer
 
 
 class SdoFollower:
-    """Puts the SDO frames of one device into words."""
+    """Describes the SDO frames of one device as text."""
 
     def __init__(self, names: ObjectNames) -> None:
         self._names = names
-        self._object: tuple[int, int] | None = None  # of a segmented transfer that has begun
-        self._size: int | None = None  # its size in [byte], where that was announced
-        self._data = b''  # what of it has come
+        self._object: tuple[int, int] | None = None  # of the current segmented transfer
+        self._size: int | None = None  # its size in [byte], if announced
+        self._data = b''  # its data so far
         self._block_title = ''  # object of a block transfer
-        self._block_size = 0  # segments before an answer
-        self._block_last: int | None = None  # of the segment that is marked as the last
-        self._sends_block: bool | None = None  # the client, or the device (False), sends segments
+        self._block_size = 0  # segments per acknowledgement
+        self._block_last: int | None = None  # number of the segment marked as last
+        self._sends_block: bool | None = None  # True: client sends segments, False: device
 
     def request(self, data: bytes) -> SdoText:
-        """Put a frame to the device into words."""
+        """Describe a frame to the device."""
         if block := self._block(data, from_client=True):
             return SdoText(block)
         try:
@@ -241,7 +241,7 @@ class SdoFollower:
                 return self._abort(message)
 
     def response(self, data: bytes) -> SdoText:
-        """Put a frame from the device into words."""
+        """Describe a frame from the device."""
         if block := self._block(data, from_client=False):
             return SdoText(block)
         try:
@@ -267,7 +267,7 @@ class SdoFollower:
                 return self._abort(message)
 
     def _block(self, data: bytes, *, from_client: bool) -> str:
-        """Put a frame of a block transfer into words; it is empty of others."""
+        """Describe a frame of a block transfer; return an empty text for other frames."""
         if len(data) != _FRAME_SIZE:
             return ''
         if self._sends_block is from_client and data[0] != _ABORT:
