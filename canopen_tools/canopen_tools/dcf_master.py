@@ -338,7 +338,7 @@ the guard time."""
 def network_objects(
     config: BusConfig, upload_files: Mapping[int, str]
 ) -> Iterator[tuple[int, DcfObject]]:
-    """Yield NMT and boot objects; upload_files are paths of concise DCFs by node id."""
+    """Yield the CiA 302 objects; upload_files are paths of concise DCFs by node id."""
     nodes = config.nodes
     if upload_files:
         yield 0x1F22, _files('Concise DCF', upload_files)

@@ -21,7 +21,7 @@ from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
 
 
 class UsageError(CanopenError):
-    """The command line is wrong; nothing has been sent."""
+    """The command line is invalid; nothing has been sent."""
 
 
 class StrictParser(argparse.ArgumentParser):

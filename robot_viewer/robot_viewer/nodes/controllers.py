@@ -29,7 +29,7 @@ STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
 STATE = '/controller_state'
 COMMAND = '/joint_trajectory'
 NEAR = 0.01  # distance in [rad] or [m] within which a joint has reached its target
-SETTLING_TIMEOUT = 1.0  # time in [s] from the end of a motion to its check
+SETTLING_TIMEOUT = 1.0  # time in [s] after a motion within which joints must arrive
 
 SILENCE = 1.2
 """Pause in [s] before an empty trajectory marks the next one as a new request: a controller that
@@ -41,7 +41,7 @@ class Controller:
     """State of one trajectory controller."""
 
     commands: Publisher  # its trajectory topic
-    joints: tuple[str, ...] = ()  # empty until its first state message
+    joints: tuple[str, ...] = ()  # empty before its first state message
     positions: dict[str, float] = field(default_factory=dict)  # measured, in [rad] or [m]
     references: dict[str, float] = field(default_factory=dict)  # set-points of the controller
     wanted: tuple[Mapping[str, float], float] | None = None

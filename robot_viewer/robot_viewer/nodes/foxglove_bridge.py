@@ -112,7 +112,7 @@ class _Channel:
 
 
 class Server:
-    """WebSocket server in its own thread; calls ``wanted`` with each newly subscribed topic."""
+    """WebSocket server in its own thread; calls ``wanted`` with a newly subscribed topic or ''."""
 
     def __init__(
         self, address: tuple[str, int], admission: Admission, wanted: Callable[[str], None]
@@ -317,7 +317,7 @@ class FoxgloveBridge(Node):
         self._server.close()
 
     def _want(self, topic: str) -> None:
-        """Request a subscription for a client; called in the server's thread."""
+        """Queue an update of the subscriptions; called in the server's thread."""
         self._fresh.append(topic)
         if self.executor is not None:
             self.executor.create_task(self._match)
