@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One axis of a CiA 402 drive in the SYNC cycle: what is commanded to it, and what stops it."""
+"""One axis of a CiA 402 drive in the SYNC cycle: its commands, supervision and stop."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ from .stop import BrakingWatch, Halt, StopSequence
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
 ENABLE_OPERATION = int(Command.ENABLE_OPERATION)
-POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
-TAKE_OVER_TIME = 0.5  # [s] for a drive that is taken over to show whether it moves
-UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
+POSITION_AGE_MAX = 0.25  # [s] oldest position at which an axis may be held
+TAKE_OVER_TIME = 0.5  # [s] in which a drive that is taken over shows whether it moves
+UNSEEN_STOP_TIME = 1.0  # [s] for a motion source to stop a silent drive on its path
 NOT_TAKEN = (
     'it has not taken its new target (bit 12); disable and enable it to make it forget the moves '
     'that it holds'
@@ -55,20 +55,20 @@ NOT_TAKEN = (
 
 
 class Phase(Enum):
-    """How much of an axis is known since its device came; a loss begins it anew."""
+    """Start-up phase of an axis after its device boots; a loss of the device restarts it."""
 
     OFFLINE = auto()  # its device is not operational
-    UNSEEN = auto()  # no controlword leaves before its TPDOs show its state
-    FOUND = auto()  # it is commanded
-    READY = auto()  # its parameters are known, too
+    UNSEEN = auto()  # no controlword is sent until its TPDOs show its state
+    FOUND = auto()  # its state is known, and the master commands it
+    READY = auto()  # its parameters are also known
 
 
 class Axis:
     """An axis of a drive, and the sole writer of its controlword, mode and target.
 
     ``read`` and ``write`` run in each cycle. Commands (``commands.py``) set :attr:`goal`, mode and
-    targets from coroutines in the same thread; the controlword follows by the table in
-    ``state_machine.py``. What the drive does by itself:
+    targets from coroutines in the same thread; the controlword follows from the table in
+    ``state_machine.py``. Reactions to what the drive does by itself:
 
     ======================  ====================  =================================================
     it shows                commanded was         then
@@ -88,29 +88,29 @@ class Axis:
     def __init__(
         self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig | None = None
     ) -> None:
-        """Bind the axis to its device; the first one unless ``config`` is another."""
+        """Bind the axis to its device: the first axis, unless ``config`` is that of another."""
         self.node = node  # the device
         self.config = config or node.config.drive  # settings of the axis
         self.view = AxisState(node, scheduler, self.config, self.warn)  # its state
-        # the name is that of the device, of its channel for one with several axes
+        # name of the device, or of the channel if the device has several axes
         self.name, at = self.view.name, self.view.at
         # called with the cause when a motion source loses the drive
         self.released: Callable[[Refusal], None] = lambda refusal: None
         # called when state and parameters are known after each boot
         self.on_ready: Callable[[], None] = lambda: None
-        self.phase = Phase.OFFLINE  # how much of it is known
-        self.goal: DriveState | None = None  # that the cycle leads to; None before a command
-        self.modes = build_modes(self.view, self.warn)  # those that this bus.yml makes possible
-        self.mode = self.modes[OperationMode.NO_MODE]  # that is commanded
-        self.halt = Halt()  # what keeps it halted
+        self.phase = Phase.OFFLINE  # start-up phase
+        self.goal: DriveState | None = None  # commanded state; None before a command
+        self.modes = build_modes(self.view, self.warn)  # modes that the objects and RPDOs allow
+        self.mode = self.modes[OperationMode.NO_MODE]  # commanded mode
+        self.halt = Halt()  # state of its halt
         self.controlword = ControlwordOutput(node, at(Index.CONTROLWORD))
-        # takes it out of operation; while that runs, nothing else leads it
+        # takes it out of operation; while it runs, it alone commands the drive
         self.stop = StopSequence(
             self.view, self.controlword, scheduler, self.report, lambda: self.halt_bits
         )
-        self.failure = ''  # why the master stopped it, until it is enabled again
+        self.failure = ''  # why the master stopped it; cleared when it is enabled
         self.resetting = False  # send fault resets while the drive is faulted
-        self.motions = 0  # that were begun by targets, moves and motion sources
+        self.motions = 0  # number of motions begun by targets, moves and motion sources
         self.period = 0.0  # length of the last cycle in [s]
         # set-point that was sent before the last position was measured, minus that position, in
         # user units
@@ -126,25 +126,25 @@ class Axis:
         self._scheduler = scheduler
         self.mode_writer = node.objects.writer(at(Index.MODE_OF_OPERATION))
         self._no_mode_zero = quirks_of(self.config.quirks).no_mode_zero
-        # a mode is shown to the drive a cycle after the target that holds it there has left
+        # the mode is sent to the drive a cycle after the target that holds the drive in it
         self._mode_led = self._mode_shown = self.mode
         self._controlword = 0
-        # by what all modes were preloaded last, and the RPDOs with that; empty after other steps
+        # inputs and RPDO values of the last preload of all modes; empty after other steps
         self._preloaded: tuple[object, ...] = ()
-        self._mode_sent: int | None = None  # in the RPDO
-        self._state = DriveState.UNKNOWN  # that the last cycle has seen
+        self._mode_sent: int | None = None  # 0x6060 in the RPDO
+        self._state = DriveState.UNKNOWN  # state in the last cycle
         self._reset_began: float | None = None
         self._braking = BrakingWatch()
         self._following = FollowingWatch()
-        self._followed = False  # bit 12 in a cyclic mode, in the last cycle
-        self._led = self._streamed = False  # by a motion source, in the last cycle and in this
+        self._followed = False  # statusword bit 12 in a cyclic mode, in the last cycle
+        self._led = self._streamed = False  # commanded by a motion source: last cycle, this cycle
         self._unseen_since: float | None = None
         self._polling: Task[None] | None = None
         node.on_lost.append(self._on_lost)
         node.on_failed.append(self.fail)
         node.lead_to_rest.append(self.lead_to_rest)
 
-    # What it is, and what it accepts.
+    # State, and which targets it accepts.
 
     def describe(self) -> str:
         """Describe the drive in a sentence."""
@@ -162,13 +162,13 @@ class Axis:
         self.node.report(EventKind.DRIVE, severity, about)
 
     def warn(self, text: str) -> None:
-        """Report what goes wrong with this drive."""
+        """Report a warning about this drive."""
         self.report(Severity.WARNING, text)
 
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
         view, refusal = self.view, self.stream_refusal
-        return AxisFeedback(  # by position, which costs a third
+        return AxisFeedback(  # positional arguments take a third of the time
             self.name,
             self.node.online,
             view.state,
@@ -184,7 +184,7 @@ class Axis:
 
     @property
     def setpoint(self) -> float:
-        """Position last commanded, the actual one where none is."""
+        """Position last commanded, or the actual position if none is commanded."""
         commanded = self.mode.setpoint
         if commanded is None or self.view.state is not DriveState.OPERATION_ENABLED:
             return self.view.position
@@ -192,12 +192,12 @@ class Axis:
 
     @property
     def is_up_to_date(self) -> bool:
-        """Whether the cycle has seen the present state; a new goal would change what it means."""
+        """Whether the cycle has processed the current state; it judges changes by the goal."""
         return self._state is self.view.state
 
     @property
     def stays_enabled(self) -> bool:
-        """Whether it is enabled, and no command is on its way that changes that."""
+        """Whether it is enabled and no pending command disables it."""
         return self.view.state is DriveState.OPERATION_ENABLED and self._enables
 
     @property
@@ -207,10 +207,10 @@ class Axis:
 
     @property
     def acts(self) -> bool:
-        """Whether the target of the selected mode acts on the drive, by its last state.
+        """Whether the target of the selected mode acts on the drive, judged by its last state.
 
-        It may be too old to accept targets (:attr:`refusal`), but a drive that cannot be seen is
-        braked in its mode, too.
+        That state may be too old to accept targets (:attr:`refusal`), but a drive without feedback
+        is also braked in its mode.
         """
         return (
             self.goal is DriveState.OPERATION_ENABLED
@@ -220,18 +220,18 @@ class Axis:
 
     @property
     def shows_mode(self) -> bool:
-        """Whether the drive displays the selected mode, and has been sent what holds it there."""
+        """Whether the drive displays the selected mode, and its holding target was sent."""
         return self._mode_shown is self.mode and self.view.mode == self.mode.number
 
     @property
     def halt_bits(self) -> int:
-        """Bit 8 while what acts on the drive is halted, also for what ends its operation."""
+        """Controlword bit 8 while the active mode is halted, also in commands that disable."""
         held = self.holding_mode
         return NO_BITS if held is None else self.halt.bits(held)
 
     @property
     def accepts_targets(self) -> bool:
-        """Whether a target of the selected mode would be executed; else see :attr:`refusal`."""
+        """Whether the drive executes a target of the selected mode; else see :attr:`refusal`."""
         return (
             self.acts
             and self.view.fresh
@@ -241,7 +241,7 @@ class Axis:
 
     @property
     def refusal(self) -> Refusal | None:
-        """Why it accepts no targets of the selected mode now; None when it does."""
+        """Why it accepts no targets of the selected mode now; None if it accepts them."""
         if self.accepts_targets:
             return None
         view, node = self.view, self.node
@@ -262,7 +262,7 @@ class Axis:
 
     @property
     def stream_refusal(self) -> Refusal | None:
-        """Why it accepts no stream of positions now; None when it does."""
+        """Why it accepts no stream of positions now; None if it accepts one."""
         refusal, mode = self.refusal, self.mode
         if refusal is not None:
             return refusal
@@ -281,19 +281,19 @@ class Axis:
 
     @property
     def shown_mode(self) -> Mode | None:
-        """Mode that the drive displays; None where it is none of :attr:`modes`."""
+        """Mode that the drive displays; None if :attr:`modes` lacks it."""
         return self.modes.get(self.view.mode)
 
     # The cycle.
 
     def read(self) -> None:
-        """Read the state from the process image, and stop the drive where that demands it."""
+        """Read the state from the process image, and stop the drive if the state requires it."""
         if self.phase is Phase.OFFLINE and self.node.operational:
             self._begin()
         view, before = self.view, self._state
         view.observe()
         if view.state is DriveState.UNKNOWN:
-            return  # what it was enabled for is judged by its next state
+            return  # the next state decides what to do
         self._state = view.state
         self.following_error = self.setpoint - view.position
         if before is DriveState.UNKNOWN and self.node.taken_over and self.goal is None:
@@ -328,19 +328,19 @@ class Axis:
         if known and (view.fresh or (self.node.operational and not unseen)):
             command, bits = self._step(self._command(), now, period)
         elif self.node.taken_over:
-            return  # its RPDOs go on to carry what another master had commanded
+            return  # its RPDOs keep the commands of the previous master
         elif unseen:
-            self.controlword.keep_back()  # it may move, and would coast
+            self.controlword.keep_back()  # Disable voltage would let a moving axis coast
         leads = self._enables and not (unseen or self.stop.running)
         if leads and self.controlword.kept_back:
             raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self._send(command, bits)
 
     def _step(self, command: Command, now: float, period: float) -> tuple[Command, int]:
-        """Advance the mode by a cycle, and let targets leave before what makes them act.
+        """Advance the mode by a cycle, and send targets before the command that activates them.
 
         Returns:
-            The command of this cycle, and the bits of mode and halt in its controlword.
+            The command of this cycle, and the controlword bits of mode and halt.
         """
         command, edge = self._lead_targets(command)
         if command is Command.ENABLE_OPERATION and self.acts:
@@ -348,28 +348,28 @@ class Axis:
         return command, self._hold_without_target(edge=edge)
 
     def _step_mode(self, now: float, period: float) -> int:
-        """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
+        """Advance mode and halt by a cycle; return their controlword bits."""
         mode, halt = self.mode, self.halt
         self._preloaded = ()
         bits = mode.step(now, period, self.view.statusword)
         if not halt.held:
             return bits
-        before = halt.bits(mode)  # at its end bit 8 goes a cycle after the new target
+        before = halt.bits(mode)  # bit 8 is cleared a cycle after the new target
         if not halt.advance(now, period, mode):
             mode.brake()
             self.warn(f'stays halted: {NOT_TAKEN}')
             return halt.bits(mode)
         held = halt.bits(mode)
         if held and mode.cyclic and (self.view.shows_torque or mode.number not in TORQUE_MODES):
-            mode.preload(self.view.actual())  # from there it goes on
-        # ends with the edge where no acknowledge comes before
+            mode.preload(self.view.actual())  # the motion continues from here
+        # without an earlier acknowledge, the halt ends with the edge of bit 4
         return bits | (held if bits & NEW_SET_POINT else before)
 
     def _lead_targets(self, command: Command) -> tuple[Command, bool]:
-        """Send targets a cycle before the mode and the command that make them act.
+        """Send targets a cycle before the mode and the command that activate them.
 
-        RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
-        before the target. The flag: this command, or the mode, makes targets act that have left.
+        If an RPDO other than that of the target carries the command, a drive may process it first.
+        The flag is True if this cycle enables the drive or switches its mode.
         """
         enabling = command is Command.ENABLE_OPERATION and not self._enables
         if self._mode_led is not self.mode:
@@ -380,10 +380,10 @@ class Axis:
         return command, switching or enabling
 
     def _hold_without_target(self, *, edge: bool) -> int:
-        """Preload what may act on the drive later, and keep up a halt while modes change.
+        """Preload targets that may act on the drive later; keep a halt while modes change.
 
-        With ``edge`` the drive is enabled, or its mode switched, by what leaves in this cycle:
-        targets stay as they left in the one before.
+        With ``edge`` this cycle enables the drive or switches its mode: targets stay as sent
+        before. Returns the halt bits of the controlword.
         """
         view, held = self.view, self.holding_mode
         if edge or (held is not None and (held is self.mode or held.cyclic)):
@@ -419,26 +419,26 @@ class Axis:
         if not number and self._no_mode_zero:
             if not self.view.mode or self.mode_writer.by_sdo:
                 return
-            number = self.view.mode  # keeps the mode that it has
+            number = self.view.mode  # keep its mode
         if number != self._mode_sent or self.mode_writer.by_sdo:
             self.mode_writer.write(number)
             self._mode_sent = number
 
-    # What is commanded in a mode.
+    # Commands in a mode.
 
     def select(self, mode: Mode) -> None:
-        """Command another mode, preloaded with where the drive is, or where it is held.
+        """Command another mode, preloaded with the actual or held position of the drive.
 
-        A target that goes by SDO is in the drive before (``commands.py``).
-        A halt goes on: until the drive shows the new mode, it may still have a target of the old.
+        A target that goes by SDO is written beforehand (``commands.py``). A halt stays active:
+        until the drive shows the new mode, it may still have a target of the old one.
         """
-        known = self.view.state is not DriveState.UNKNOWN  # else its first position preloads it
+        known = self.view.state is not DriveState.UNKNOWN  # else the first position preloads it
         if known and self.holding_mode is not mode and not mode.by_sdo:
             self.preload(mode)
         self.mode = mode
 
     def preload(self, mode: Mode) -> Promise[None]:
-        """Set the target of a mode to where the drive is, or where it is held.
+        """Set the target of a mode to the actual position, or to the held set-point.
 
         Returns:
             Done when the drive has it.
@@ -446,13 +446,13 @@ class Axis:
         held, actual = self.holding_mode, self.view.actual()
         self._preloaded = ()
         if isinstance(held, CyclicPosition):
-            # under load the drive is not quite where it is held, and would sag to where it is
+            # under load the actual position is off the set-point; holding there would let it sag
             position_inc = self.view.units.position.to_device(held.setpoint)
             actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
         return mode.preload(actual)
 
     def select_back(self, mode: Mode) -> None:
-        """Command the mode of before after a switch that failed; the drive is halted in it."""
+        """Command the previous mode after a failed switch; the drive is halted in it."""
         if not self.node.online or self.mode is mode:
             return
         if self.view.state is DriveState.OPERATION_ENABLED:
@@ -460,25 +460,25 @@ class Axis:
         self.select(mode)
 
     def hold(self) -> None:
-        """Brake, and stay halted until a new target is taken."""
+        """Brake, and stay halted until the drive has taken a new target."""
         self._preloaded = ()
         self.mode.brake()
         self.halt.hold()
 
     def hold_here(self) -> None:
-        """Hold it where it is, so that it does not jump when it comes free or is reached again."""
+        """Halt it at its actual position, so that it does not jump when freed or reconnected."""
         self.hold()
         self.mode.preload(self.view.actual())
 
     def check_target(self, target: float) -> None:
-        """Refuse a target beyond the limits that the drive has in the selected mode."""
+        """Refuse a target beyond the limits of the drive in the selected mode."""
         view = self.view
         check_target(
             self.name, self.mode, view.parameters, view.units, target, position=view.position
         )
 
     def stream(self, setpoint: Setpoint) -> None:
-        """Follow a motion source in this cycle.
+        """Command the set-point of a motion source for this cycle.
 
         Raises:
             DriveError: A value is not finite, does not fit its object or is beyond a limit.
@@ -494,12 +494,12 @@ class Axis:
         self.motions += not self._led
         self._streamed = True
 
-    # What takes it out of operation.
+    # Taking it out of operation.
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop and disable the drive, because its cycle failed; never raises.
 
-        The other drives go on. An error that the drive itself could not have caused is a defect;
+        Other drives continue. An error that the drive cannot have caused is a defect;
         ``output`` is an RPDO of its device that cannot be sent.
         """
         text = str(error)
@@ -509,23 +509,23 @@ class Axis:
         try:
             self._send(self._command())
             self.feed_forward.end()
-        except Exception:  # noqa: BLE001  # its cause may hinder this, too
+        except Exception:  # noqa: BLE001  # the cause of the failure may also affect this
             self.stop.use_sdo()
         if output in self.controlword.outputs:
             self.stop.use_sdo()
 
     def leave_operation(self) -> None:
-        """Lead it to Switch On Disabled, by the stop sequence where it may still move."""
+        """Command Switch On Disabled; run the stop sequence if the axis may still move."""
         self.goal = DriveState.SWITCH_ON_DISABLED
         if self.view.state in POWERED and not self.view.stands:
             self.stop.begin()
 
     async def lead_to_rest(self, reason: str, severity: Severity = Severity.ERROR) -> bool:
-        """Bring it to rest and take its power away; return whether that was seen.
+        """Bring it to rest and remove its power; return whether feedback confirmed that.
 
-        What TPDOs do not show is read by SDO; one that does not answer is left as it is.
+        State missing in TPDOs is read by SDO; a device that does not answer is left as it is.
         """
-        await self.stop.ended()  # that the loss of its device has begun
+        await self.stop.ended()  # the stop begun at the loss of its device
         state = self.view.state if self.view.fresh else await self.view.look()
         if state in (*POWERED, DriveState.FAULT_REACTION_ACTIVE):
             self._note_interruption()
@@ -533,7 +533,7 @@ class Axis:
             await self.stop.ended()
             seen = self.stop.disabled and self.stop.rests
         elif self.node.operational:
-            seen = await self.stop.seen_at_rest()  # without power it may coast
+            seen = await self.stop.seen_at_rest()  # it may coast without power
         else:
             seen = self.view.stands
         if not self.node.operational:
@@ -541,7 +541,7 @@ class Axis:
         return seen
 
     def _take_out(self, refusal: Refusal, text: str, severity: Severity = Severity.ERROR) -> None:
-        """Stop and disable it; only the first cause is reported until it is enabled again."""
+        """Stop and disable it; report only the first cause until it is enabled again."""
         if self.goal is not None:
             self.goal = DriveState.SWITCH_ON_DISABLED
         first, self.failure = not self.failure, self.failure or text
@@ -552,20 +552,20 @@ class Axis:
         self.released(refusal)
         self.report(severity, f'stopping: {text}')
 
-    # Events: its device comes, it is seen, its state changes, its device is lost.
+    # Events: device operational, first state, state change, device lost.
 
     def _begin(self) -> None:
-        """Read the parameters of a device that has come into operation."""
+        """Read the parameters of the drive when its device becomes operational."""
         self.phase = Phase.UNSEEN
         self._preloaded = ()
-        self._mode_sent = None  # the boot has put into the RPDO what the device holds
+        self._mode_sent = None  # the boot has set the RPDO to the device's value
         self.view.cache.begin()
         if self.config is self.node.config.drive:  # one axis polls for all
             poll = self.node.objects.poll(self.node.config.poll_period)
             self._polling = self._scheduler.background(poll)
 
     def _found(self) -> None:
-        """Command it from now on; one that is enabled without a command of ours is stopped."""
+        """Command it from now on; stop it if it is enabled without a command of this master."""
         self.phase = Phase.FOUND
         if self.stop.running:
             return
@@ -575,7 +575,7 @@ class Axis:
             self.leave_operation()
 
     def _take_over(self) -> None:
-        """Go on where another master has left the drive: enabled, it is held."""
+        """Take over the drive as the previous master left it; hold it if it is enabled."""
         held, view = self.holding_mode, self.view
         if held is not None:
             actual, is_torque = view.actual(), held.number in TORQUE_MODES
@@ -583,9 +583,9 @@ class Axis:
                 target = view.held_target(held.number)
                 if target is not None:
                     actual = actual._replace(position_inc=target)
-            elif is_torque:  # as the other master commanded it: 0x6077 may be in no TPDO
+            elif is_torque:  # as the other master commanded it: no TPDO may carry 0x6077
                 actual = actual._replace(torque=view.held_target(held.number) or 0)
-            if not (is_torque and held.by_sdo):  # then the drive has what holds its load
+            if not (is_torque and held.by_sdo):  # else the drive already has its holding torque
                 held.preload(actual)
             self.mode = self._mode_shown = self._mode_led = held
             self.goal = DriveState.OPERATION_ENABLED
@@ -597,13 +597,13 @@ class Axis:
             self.leave_operation()
 
     async def _hold_taken_over(self, mode: Mode) -> None:
-        """Halt what moves on by a target of the other master: a move, or a torque."""
+        """Halt a drive that still moves by a target of the other master: a move, or a torque."""
         motions, taken = self.motions, f'taken over enabled, in mode {mode_title(mode.number)}'
         holds = isinstance(mode, CyclicPosition)
         with suppress(TimeoutError):
             await self._scheduler.until(lambda: holds or self.view.speed_known, TAKE_OVER_TIME)
         if self.mode is not mode or not self.acts or self.motions != motions:
-            return  # a command has come meanwhile
+            return  # a new command has arrived meanwhile
         if holds or self.view.stands:
             self.report(Severity.INFO, f'{taken}; it {"holds" if holds else "stands"}')
             return
@@ -615,7 +615,7 @@ class Axis:
         if left:
             self.halt.release()
         if before in FAULTY and view.state not in FAULTY:
-            view.error = ''  # also where another tool has reset it
+            view.error = ''  # even if another tool has reset the fault
         if view.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
             view.error = view.error_of_emcy()
@@ -627,7 +627,7 @@ class Axis:
             self.released(Refusal(RefusalCause.NOT_ENABLED, view.state.title))
 
     def _left_by_itself(self) -> None:
-        """Keep it from starting again when the cause goes away, with power while it brakes."""
+        """Keep it from restarting when the cause disappears; keep power while it brakes."""
         goal, cause = DriveState.SWITCH_ON_DISABLED, 'is the voltage or the safe torque off gone?'
         if self.view.state is DriveState.QUICK_STOP_ACTIVE:
             goal = DriveState.QUICK_STOP_ACTIVE
@@ -645,12 +645,12 @@ class Axis:
         self.report(Severity.ERROR, f'FAULT: {self.describe()}; recover it')
 
     def _note_interruption(self) -> None:
-        """Keep the mode that it is enabled in, for the time after its device is lost."""
+        """Store the mode in which it is enabled, to restore it after a loss of its device."""
         if self.goal is self.view.state is DriveState.OPERATION_ENABLED:
             self.interrupted = self.mode.number
 
     def _on_lost(self, reason: str) -> None:
-        """Command nothing any more, and select no mode."""
+        """Handle the loss of its device: no goal, no mode, and a stop if it may still move."""
         view, node = self.view, self.node
         view.cache.forget(reason)
         if self._polling is not None:
@@ -675,23 +675,23 @@ class Axis:
         left = node.left_operational
         cause = RefusalCause.NOT_OPERATIONAL if left else RefusalCause.OFFLINE
         self.released(Refusal(cause, reason))
-        if powered and by_itself:  # it may receive what it does not answer
+        if powered and by_itself:  # it may still receive frames
             self.stop.begin(quiet=True)
         elif powered and node.online:
             self._scheduler.background(self._brake_without_pdos(reason))
 
     async def _brake_without_pdos(self, reason: str) -> None:
-        """Stop an axis that goes on without its master, as a command took its device from PDOs."""
+        """Stop by SDO an axis that keeps moving after an NMT command ended its PDO operation."""
         self.failure = failure = f'{reason}, and it is not seen to stand'
         self.warn(f'stopping by SDO: {reason}')
         await self.stop.run()
         if self.stop.disabled and self.stop.rests and self.failure == failure:
             self.failure = ''
 
-    # What is watched in each cycle: that it is seen, brakes when it shall, and follows.
+    # Supervision in each cycle: fresh feedback, braking, following.
 
     def _watch_sight(self) -> None:
-        """Bring a drive to rest that acts on targets and has stopped to send its state."""
+        """Stop an active drive that no longer sends its state."""
         view = self.view
         if self._unseen_since is None:
             self._unseen_since = self._scheduler.now
@@ -707,7 +707,7 @@ class Axis:
         )
 
     def _watch_statusword(self) -> None:
-        """Stop a drive whose statusword has shown no state for too long: it may be faulted."""
+        """Stop a drive whose statusword shows no valid state for too long: it may be faulted."""
         view = self.view
         if view.undecoded is None or view.fresh or self.goal is not DriveState.OPERATION_ENABLED:
             return
@@ -715,18 +715,18 @@ class Axis:
         self._take_out(Refusal(RefusalCause.STATE_UNKNOWN, view.word_text), text)
 
     async def _look_for_motion(self) -> None:
-        """See by SDO whether a drive slows down whose TPDOs do not come."""
+        """Poll the state by SDO while TPDOs are missing, to see whether the drive slows down."""
         while not self.view.fresh and self.acts:
             await self.view.look()
             await self._scheduler.timer(LOOK_PERIOD)
 
     def _is_led_to_rest(self) -> bool:
-        """Whether a motion source may still lead a silent drive, to stop it on its path."""
+        """Return whether a motion source may still command a silent drive, to stop on its path."""
         since = self._unseen_since
         return self._led and since is not None and self._scheduler.now - since < UNSEEN_STOP_TIME
 
     def _watch_braking(self) -> None:
-        """Stop an axis by stronger means that a halt, or being disabled, does not slow down."""
+        """Escalate the stop of an axis that a halt or disabling does not slow down."""
         view, halted = self.view, self.halt.rests
         goal, enabled = self.goal, DriveState.OPERATION_ENABLED
         commanded = halted or not (goal is enabled or goal is None)
@@ -749,7 +749,7 @@ class Axis:
         self.report(Severity.ERROR, text)
 
     def _watch_following(self) -> None:
-        """Stop a drive that is left behind by the set-points of a cyclic mode."""
+        """Stop a drive that does not follow the set-points of a cyclic mode."""
         mode = self.mode
         if not (mode.cyclic and self.accepts_targets):
             self._followed = False
@@ -762,7 +762,7 @@ class Axis:
         lost, self._followed = self._followed and not follows, follows
         if lost:
             rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
-            # in mode 7 bit 12 may go where nothing moves, in mode 10 by a halt
+            # bit 12 may be cleared in mode 7 at standstill, in mode 10 by a halt
             if not (rests or self.halt_bits):
                 self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
                 self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to an axis: coroutines of many cycles, each answered with a sentence.
+"""Commands to an axis: coroutines that run for many cycles and return a text for the client.
 
-First what runs and how targets are handed over, then the commands. ``steps.py`` has the steps that
-they are made of, ``sequences.py`` those that stop or home it.
+First scheduling and the delivery of targets, then the commands. ``steps.py`` has their steps,
+``sequences.py`` the commands for stops and homing.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ T = TypeVar('T')
 Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
 SELECT_MODE = '; select a mode before the first target'
-SETTLING_TIME = 0.5  # [s] from standstill to the place
-WAY_SHARE = 0.02  # of a way that may be left at its end, where the drive has no window (0x6067)
-WINDOW_INCREMENTS = 10  # the same of short ways [increments]
-SAG_TOLERANCES = 5.0  # of these, by which a load may keep an axis away from its set-point
-TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
+SETTLING_TIME = 0.5  # [s] to settle at the target after standstill
+WAY_SHARE = 0.02  # smallest arrival tolerance, as a share of the distance
+WINDOW_INCREMENTS = 10  # [inc] smallest arrival tolerance
+SAG_TOLERANCES = 5.0  # accepted offset of an axis under load, in arrival tolerances
+TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] for the drive to take a target and leave its halt
 
 
 class AxisCommands:
-    """The commands of one axis. Each returns what was reached, or raises DriveError."""
+    """Commands of one axis; each returns its result as text, or raises DriveError."""
 
     def __init__(self, axis: Axis, scheduler: Scheduler) -> None:
         self.axis = axis
         self._steps = AxisSteps(axis, scheduler)
-        self.stops = StopCommands(self._steps, scheduler)  # those that stop it
+        self.stops = StopCommands(self._steps, scheduler)  # commands that stop it
         self._stopping: dict[str, Sequence] = {
             'disable': self.stops.disable,
             'halt': self.stops.halt,
             'quick_stop': self.stops.quick_stop,
             'shutdown': self.stops.shutdown,
         }
-        # those without arguments by name, for :meth:`request`
+        # commands without arguments by name, for :meth:`request`
         self.offered: dict[str, Sequence] = {
             'init': self.init,
             'enable': self.enable,
@@ -61,18 +61,18 @@ class AxisCommands:
             **self._stopping,
         }
         self._scheduler = scheduler
-        self.stop_count = 0  # of commands that stop the drive
+        self.stop_count = 0  # number of stop commands
         self._running = ''
-        self._delivery = completed()  # of the target or move that was commanded last
+        self._delivery = completed()  # delivery of the last target or move
         self._task: Task[str] | None = None
-        self._leaving: Promise[str] | None = None  # the shutdown at the end of the master
+        self._leaving: Promise[str] | None = None  # shutdown before the master ends
         self._stream = TargetStream(axis, scheduler, self._steps.settle)
         axis.on_ready = self._go_on
 
-    # Which command runs.
+    # Scheduling of commands.
 
     def request(self, name: str) -> Promise[str]:
-        """Run one of those that are offered; what stops the drive ends the one that runs."""
+        """Run a command by name; a stop command cancels the running command."""
         return self.run(name, self.offered[name](), preempt=name in self._stopping)
 
     def run(
@@ -83,13 +83,13 @@ class AxisCommands:
         preempt: bool = False,
         by_itself: bool = False,
     ) -> Promise[str]:
-        """Run one of the coroutines below unless another one runs.
+        """Run one of the coroutines below, unless another one is running.
 
         Args:
             name: Name of the command, for messages.
             sequence: The coroutine.
-            preempt: End the one that runs instead of being refused; for what stops a axis.
-            by_itself: No client has requested it, so no stream of targets is let in for it.
+            preempt: Cancel the running command instead of being refused; for stop commands.
+            by_itself: No client requested it, so it does not re-admit a stream of targets.
         """
         if self._leaving is not None:
             sequence.close()
@@ -111,12 +111,12 @@ class AxisCommands:
         return self._task
 
     def leave(self) -> Promise[str]:
-        """Shut the drive down for good: what stops it has that result, all else is refused."""
+        """Shut down for good: later stop commands share the result, others are refused."""
         self._leaving = self.request('shutdown')
         return self._leaving
 
     def cancel(self, reason: str) -> None:
-        """End the command that runs, if any."""
+        """Cancel the running command, if any."""
         if self._task is not None:
             self._task.cancel(DriveError(reason))
 
@@ -127,7 +127,7 @@ class AxisCommands:
 
     @property
     def stopping(self) -> Promise[str] | None:
-        """The command that stops the drive, while one runs."""
+        """The running stop command, if any."""
         if self._leaving is not None:
             return self._leaving
         return self._task if self._busy and self._running in self._stopping else None
@@ -135,7 +135,7 @@ class AxisCommands:
     # Targets and moves.
 
     def set_target(self, target: float) -> str:
-        """Move to a position, at a velocity or with a torque, in the mode that is selected."""
+        """Command a position, velocity or torque in the selected mode; return a description."""
         mode = self.axis.mode
         self._set(mode.set_target, target)
         self._stream.interrupt('a single target')
@@ -144,7 +144,7 @@ class AxisCommands:
     def deliver(self, command: Callable[[], str]) -> Promise[str]:
         """Run ``command``, which sets a target or a move.
 
-        Done when the drive has it, and no halt keeps it.
+        The promise is done when the drive has it and no halt holds the axis.
         """
         return self._scheduler.spawn(self._delivered(command))
 
@@ -154,7 +154,7 @@ class AxisCommands:
         delivery, motion = self._delivery, axis.motions
         try:
             await self._taken(mode, delivery)
-        except DriveError as error:  # a target that was reported as failed must not move it later
+        except DriveError as error:  # a target reported as failed must not move the axis later
             if delivery.done and not isinstance(delivery.error, SdoTimeoutError):
                 raise
             if isinstance(mode, ProfilePosition):
@@ -166,7 +166,7 @@ class AxisCommands:
         return answer
 
     async def _taken(self, mode: Mode, delivery: Promise[None]) -> None:
-        """Wait until the drive has what was commanded in a mode, and no halt keeps it."""
+        """Wait until the drive has the target of a mode, and no halt holds the axis."""
         axis = self.axis
         halt = axis.halt
 
@@ -188,12 +188,12 @@ class AxisCommands:
             raise self._steps.refused('was stopped before it had taken the target')
 
     async def arrive(self, command: Callable[[], str], timeout: float) -> str:
-        """Run ``command``, which sets a target or a move, and wait until the drive stands there.
+        """Run ``command``, which sets a target or a move, and wait for standstill at the target.
 
-        One that is later than ``timeout`` in [s], or stands elsewhere, is halted.
+        An axis that needs longer than ``timeout`` in [s], or stands elsewhere, is halted.
 
         Raises:
-            DriveError: It is late, was stopped before, got another target or mode, or stands
+            DriveError: It is late, was stopped, got another target or mode, or stands
                 elsewhere.
         """
         axis = self.axis
@@ -216,7 +216,7 @@ class AxisCommands:
         try:
             await self._scheduler.until(lambda: lost() or arrived(), timeout)
         except TimeoutError:
-            if not lost():  # else another client owns the motion
+            if not lost():  # else the motion belongs to another client
                 raise await self._halted(f'has not arrived within {timeout:g} s') from None
         if lost():
             raise self._steps.refused(ended)
@@ -230,14 +230,14 @@ class AxisCommands:
             window = min(
                 axis.view.parameters.following_window or math.inf, SAG_TOLERANCES * tolerance
             )
-            # a set-point on which a load hangs stays, else it would sag once more
+            # keep the set-point under load, else the axis would sag further
             sags = mode.cyclic and abs(axis.following_error) <= window
             (axis.hold if sags else axis.hold_here)()
             raise await self._halted(elsewhere)
         return axis.describe()
 
     def _tolerance(self, start: float) -> float:
-        """Return how far from its set-point an axis that came from ``start`` has arrived."""
+        """Return the arrival tolerance for a motion from ``start``, in user units."""
         view = self.axis.view
         return max(
             view.parameters.position_window or 0.0,
@@ -246,9 +246,9 @@ class AxisCommands:
         )
 
     async def _elsewhere(self, tolerance: float, replaced: Callable[[], bool]) -> str:
-        """Return where an axis stands, empty where that is its target.
+        """Describe where an axis stands; return an empty text if it is at its target.
 
-        The drive may have shortened the way to its own limits, and in the cyclic modes no bit
+        The drive may have clamped the target to its own limits, and in the cyclic modes no bit
         shows the arrival.
         """
         axis = self.axis
@@ -267,7 +267,7 @@ class AxisCommands:
         )
 
     async def _halted(self, failure: str) -> DriveError:
-        """Halt an axis whose motion has failed; return the error, with what came of the halt."""
+        """Halt an axis whose motion failed; return the error with the result of the halt."""
         text = f'{self.axis.name} {failure}'
         try:
             return DriveError(f'{text}, and was halted: {await self.request("halt")}')
@@ -275,30 +275,30 @@ class AxisCommands:
             return DriveError(f'{text}, and was commanded to halt: {error}')
 
     def stream_target(self, target: float) -> None:
-        """Follow a stream of targets; when it pauses for too long, the drive stops."""
+        """Follow a stream of targets; stop the drive if it pauses for too long."""
         self._stream.admit()
         self._set(self.axis.mode.follow_target, target)
         self._stream.follow(self._delivery)
 
     def move(self, move: Move) -> str:
-        """Hand a move to the drive in mode 1, with all that the mode offers.
+        """Command a move in mode 1, with all options of the mode; return a description.
 
         Raises:
-            DriveError: Another mode is selected, or the drive cannot take it.
+            DriveError: Another mode is selected, or the drive cannot take the move.
         """
         axis, mode = self.axis, self.axis.mode
         if not isinstance(mode, ProfilePosition):
             raise self._steps.refused('moves only in mode 1; select position_mode first')
         self._require_acceptance()
         if axis.halt.rests:
-            move = replace(move, immediate=True)  # the halt has ended the moves before it
+            move = replace(move, immediate=True)  # the halt has cancelled earlier moves
         destination = self._named(lambda: mode.destination(move))
         axis.check_target(destination)
         delivery = self._named(lambda: mode.move(move))
         self._stream.interrupt('a single move')
         self._resume(delivery)
         if not move.immediate:
-            self._delivery = completed()  # answered when it is queued, not when its turn comes
+            self._delivery = completed()  # done when queued, not when started
         how = 'at once' if move.immediate and mode.waiting == 1 else 'after the moves before it'
         return f'to {destination:g}, {how}'
 
@@ -308,7 +308,7 @@ class AxisCommands:
         self._resume(self._named(lambda: command(target)))
 
     def _named(self, command: Callable[[], T]) -> T:
-        """Command the mode; what it refuses gets the name of the axis."""
+        """Run a command of the mode; add the name of the axis to its errors."""
         try:
             return command()
         except DriveError as error:
@@ -326,9 +326,9 @@ class AxisCommands:
         if refusal.cause in (RefusalCause.FAULT, RefusalCause.NOT_ENABLED):
             raise self._steps.refused(f'takes no target; {self._steps.way_to_enable()}')
         if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(axis.mode, NoMode):
-            return  # which refuses every target itself
+            return  # mode 0 refuses every target itself
         if refusal.cause is RefusalCause.OFFLINE:
-            raise self._steps.refused('takes no target')  # whose description says why
+            raise self._steps.refused('takes no target')  # the error describes why
         raise self._steps.refused(f'takes no target: it {refusal}')
 
     def _ending(self) -> DriveError:
@@ -337,15 +337,15 @@ class AxisCommands:
     def _resume(self, delivery: Promise[None]) -> None:
         self._delivery = delivery
         self.axis.motions += 1
-        self.axis.halt.leave(self._scheduler.now, delivery)  # so that no old one revives
+        self.axis.halt.leave(self._scheduler.now, delivery)  # so that no old target resumes
         self.axis.released(Refusal(RefusalCause.SINGLE_TARGET))
 
-    # The commands, beside those of ``sequences.py``.
+    # The commands, except those of ``sequences.py``.
 
     async def init(self) -> str:
-        """Reset a fault, enable, home where bus.yml has a method, and select no mode.
+        """Reset a fault, enable, home if bus.yml sets a method, and select mode 0.
 
-        A drive that refuses to have no mode is left in the one that it had, or bus.yml names.
+        A drive that refuses mode 0 keeps its mode, or gets the one in bus.yml.
         """
         axis = self.axis
         await self._steps.ready()
@@ -360,7 +360,7 @@ class AxisCommands:
                 homed = await self._home_at_init()
             if self._steps.needs_mode and axis.mode.number is OperationMode.HOMING:
                 await self._steps.return_to(before)
-        except BaseException:  # a drive may go on although its bit 4 is cleared
+        except BaseException:  # a drive may keep moving although bit 4 is cleared
             if axis.node.online and axis.view.state is DriveState.OPERATION_ENABLED:
                 axis.hold()
             raise
@@ -373,21 +373,21 @@ class AxisCommands:
         return f'{axis.view.state.title}{homed}{hint}'
 
     async def enable(self) -> str:
-        """Lead to Operation Enabled, without homing and without resetting a fault."""
+        """Enable the drive without homing it or resetting a fault."""
         await self._steps.ready()
         self._steps.require_no_fault()
         await self._steps.reach(DriveState.OPERATION_ENABLED)
         return self._enabled()
 
     async def recover(self) -> str:
-        """Reset a fault and lead to Operation Enabled, with no target left over."""
+        """Reset a fault and enable the drive; earlier targets are discarded."""
         await self._steps.ready()
         await self._steps.reset_fault()
         await self._steps.reach(DriveState.OPERATION_ENABLED)
         return self._enabled()
 
     def _enabled(self) -> str:
-        """Describe an enabled drive; one that came back to the bus has lost its mode."""
+        """Describe an enabled drive; after a loss of its device, it has no mode."""
         has_mode = self.axis.mode.number is not OperationMode.NO_MODE
         return self.axis.describe() + ('' if has_mode else SELECT_MODE)
 
@@ -396,10 +396,10 @@ class AxisCommands:
         method: int | None = None,
         notify: Callable[[HomingProgress], None] = lambda progress: None,
     ) -> str:
-        """Enable the drive if it is not, home it, and select the mode of before again.
+        """Enable the drive if necessary, home it, and return to the previous mode.
 
-        By a method of 0x6098, None for the one in the drive; ``notify`` gets each phase when it
-        begins.
+        ``method`` is a value of 0x6098, None for the one in the drive. ``notify`` is called when a
+        phase begins.
         """
         axis = self.axis
         await self._steps.ready()
@@ -409,14 +409,14 @@ class AxisCommands:
         before = self._steps.mode_to_return_to()
         try:
             answer = await home(self._steps, method, notify)
-        except BaseException:  # also when it is cancelled, and there is no time to wait
+        except BaseException:  # also on cancellation, when there is no time to wait
             axis.select_back(before)
             raise
         await self._steps.return_to(before)
         return f'{answer}; {axis.describe()}'
 
     async def select_mode(self, number: OperationMode) -> str:
-        """Switch the mode of operation; the drive is left as enabled as it was.
+        """Switch the mode of operation; the drive stays enabled or disabled.
 
         Raises:
             DriveError: The drive is offline or faulted, lacks the mode, or does not switch.
@@ -435,7 +435,7 @@ class AxisCommands:
         return f'{axis.describe()}{hint}'
 
     async def _home_at_init(self) -> str:
-        """Home where bus.yml has a method; return what was done, or what could be."""
+        """Home the drive if bus.yml sets a method; return what was done, or a hint."""
         axis = self.axis
         write = axis.node.config.write_of(axis.view.at(Index.HOMING_METHOD), 0)
         if write is not None and (method := int.from_bytes(write.data, 'little', signed=True)):
@@ -449,7 +449,7 @@ class AxisCommands:
         )
 
     def _go_on(self) -> None:
-        """Enable it again in the mode that it had before a loss, where bus.yml wants that."""
+        """Re-enable it in its mode before a loss, if bus.yml sets that as ``recovery``."""
         axis = self.axis
         mode, axis.interrupted = axis.interrupted, None
         if mode is not None and axis.config.recovery is RecoveryPolicy.AUTO:

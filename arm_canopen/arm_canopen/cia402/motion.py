@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motion sources: what moves the drives in step with SYNC, and why a drive does not follow."""
+"""Motion sources, which command drives in each SYNC cycle, and reasons why a drive refuses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from canopen_core.standard import DriveState
 
 
 class RefusalCause(Enum):
-    """What keeps a drive from accepting targets; the value follows the name of the drive."""
+    """Why a drive accepts no targets; the value is a text that follows the drive's name."""
 
     OFFLINE = 'is offline'
     NOT_OPERATIONAL = 'is not in the NMT state Operational'
@@ -39,65 +39,65 @@ class RefusalCause(Enum):
 class Refusal:
     """Why a drive accepts no targets."""
 
-    cause: RefusalCause  # what keeps it from accepting them, for programs
-    detail: str = ''  # more of it in words; may be empty
+    cause: RefusalCause  # cause, for programs
+    detail: str = ''  # details in words; may be empty
 
     def __str__(self) -> str:
-        """Return it as a sentence without its subject, which is the drive."""
+        """Return a sentence without its subject, the drive."""
         return f'{self.cause.value}: {self.detail}' if self.detail else self.cause.value
 
 
-@dataclass(slots=True)  # not frozen, which would make it at five times the cost
+@dataclass(slots=True)  # not frozen, which takes five times as long to create
 class AxisFeedback:
-    """What is known of one drive at the start of a cycle, made anew for each.
+    """State of one drive at the start of a cycle, created in each cycle.
 
-    Positions are in user units (rad for a revolute joint), velocities in those per second.
+    Positions are in user units (rad for a revolute joint), velocities in user units per second.
     """
 
     name: str  # name of the drive in bus.yml
-    online: bool  # booted, and its heartbeat is there
+    online: bool  # booted, and not lost since
     state: DriveState  # of the power drive system
     mode: int  # mode of operation as displayed in 0x6061
-    position: float  # actual one; the last one of a lost drive, NaN before the first
-    velocity: float  # actual one
-    setpoint: float  # position last commanded; equals ``position`` while disabled
-    # a position set-point of a source is sent in this cycle: the drive is online, Operation
-    # Enabled and in a cyclic position mode, and nothing else moves it
+    position: float  # actual position; the last one of a lost drive, NaN before the first
+    velocity: float  # actual velocity
+    setpoint: float  # last commanded position; equals ``position`` while disabled
+    # the drive accepts a position set-point in this cycle: it is online, Operation Enabled and in
+    # a cyclic position mode, and nothing else moves it
     followable: bool
-    # why it accepts no stream of positions; None when it does. A drive that moves and has stopped
-    # to send its TPDOs is followable for another second in spite of it, so that the source can
-    # bring the whole arm to rest on its path; then it is halted
+    # why it accepts no stream of positions; None if it accepts one. A moving drive whose TPDOs
+    # stop nevertheless stays followable for a second, so that the source can stop the whole arm
+    # on its path; then the drive is halted
     refusal: Refusal | None = None
-    age: float = 0.0  # of the oldest of these values in [s]; infinite while they are unknown
-    speed_limit: float = math.inf  # greatest velocity that it takes (0x607F)
+    age: float = 0.0  # age of the oldest of these values in [s]; infinite if unknown
+    speed_limit: float = math.inf  # maximum velocity of the drive (0x607F)
 
 
 @dataclass(slots=True)  # as above
 class Setpoint:
-    """A position, and what the drive shall add to its own control on the way there.
+    """A position set-point with its feed-forward.
 
-    Feed-forward has an effect in mode 8, where an RPDO carries its object.
+    Feed-forward has an effect in mode 8, if an RPDO carries its object.
     """
 
     position: float  # in user units
-    velocity: float = 0.0  # of 0x60B1 in user units per second, usually the rate of the position
-    effort: float = 0.0  # of 0x60B2, such as the weight of what hangs on the axis
+    velocity: float = 0.0  # 0x60B1 in user units per second, usually the rate of the position
+    effort: float = 0.0  # 0x60B2 in units of effort, such as the gravity load of the axis
 
 
 class MotionSource(Protocol):
-    """Something that commands positions of one or more drives, cycle by cycle.
+    """Interface of controllers that command positions of one or more drives in each cycle.
 
     It runs in the thread of the SYNC cycle: it must not block, wait or call ROS.
     """
 
     @property
     def axes(self) -> Sequence[str]:
-        """Names of the drives that it commands, fixed for its life."""
+        """Names of the drives that it commands; they never change."""
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[float | Setpoint | None]:
-        """Answer the set-points of this cycle.
+        """Return the set-points of this cycle.
 
         A new stream must start at ``feedback[i].setpoint``; a set-point for an axis that is not
         ``followable`` is ignored.
@@ -108,17 +108,17 @@ class MotionSource(Protocol):
             feedback: State of each axis, in the order of :attr:`axes`.
 
         Returns:
-            For each axis the position to command in user units, alone or with its feed-forward,
+            For each axis the position to command in user units, optionally with feed-forward,
             or None to leave it where it is.
         """
 
     def released(self, axis: str, refusal: Refusal) -> None:
-        """Learn that an axis was taken away; until attached again its set-points are ignored.
+        """Handle the loss of an axis, whose set-points are ignored until attached again.
 
-        It is called for an axis that was away before, too, where a client stops or moves it:
-        what the source was about to begin when it gets the axis back is older than that.
+        It is also called for an axis lost before if a client stops or moves it: a motion that the
+        source has planned for the axis is outdated then.
 
         Args:
             axis: Name of the drive.
-            refusal: Why: a single target, another mode, a fault, a loss.
+            refusal: Reason, such as a single target, another mode, a fault or a loss.
         """

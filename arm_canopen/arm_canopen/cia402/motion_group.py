@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""All drives of a bus in one cycle, the motion sources that command them, and the stop of all."""
+"""The drives of a bus: their common cycle, their motion sources, and the stop of all."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from .motion import AxisFeedback, MotionSource, Refusal, RefusalCause, Setpoint
 from .sequences import BRAKED_TIMEOUT
 from .state import FAULTY, POWERED
 
-HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
-SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
-DEFAULT_SPEED_MARGIN = 10.0  # the same of the profile velocity, for drives without one
-RANGE_TIME = 0.25  # [s] in which those may cross their range (0x607D), too
+HAND_OVER_MARGIN = 2.0  # allowed distance of a stream's start, in cycles at profile velocity
+SPEED_MARGIN = 1.5  # multiple of the maximum speed (0x607F) above which a step is a jump
+DEFAULT_SPEED_MARGIN = 10.0  # the same multiple of the profile velocity, without 0x607F
+RANGE_TIME = 0.25  # [s] in which drives without 0x607F may cross their range (0x607D)
 BY_CLIENTS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED, RefusalCause.SINGLE_TARGET)
 
 
 @dataclass(slots=True)
 class Attachment:
-    """A source, its drives in its order, and which of them it has taken over.
+    """A source, its drives in its order, and those that it commands.
 
-    One that has failed is asked no more, and still learns what its drives are taken away for.
+    A failed source is no longer updated, but still notified when it loses a drive.
     """
 
     source: MotionSource
@@ -45,8 +45,8 @@ class MotionGroup:
     """The drives of one bus by name, in the order of bus.yml.
 
     A drive belongs to one source at most. It is released when a client commands a single target,
-    another mode or a stop, and when it faults or is lost; its source does not get it back by
-    itself.
+    another mode or a stop, and when it faults or is lost; its source gets it back only when
+    attached again.
     """
 
     def __init__(self, drives: Sequence[Axis], report: Report) -> None:
@@ -59,10 +59,10 @@ class MotionGroup:
     def attach(self, source: MotionSource) -> None:
         """Attach a source, which commands its axes from the next cycle on.
 
-        Attached again, it gets back what it had lost; the axes that it still has go on.
+        Attaching it again returns lost axes to it; axes that it still has continue.
 
         Raises:
-            KeyError: An axis is no drive of this bus.
+            KeyError: An axis is not a drive of this bus.
         """
         unknown = [name for name in source.axes if name not in self.drives]
         if unknown:
@@ -78,12 +78,12 @@ class MotionGroup:
         self._attachments.append(Attachment(source, drives, list(drives), streaming))
 
     def detach(self, source: MotionSource) -> None:
-        """End a source; drives that it moved are braked."""
+        """Detach a source; drives that it moves are braked."""
         self._attachments = [entry for entry in self._attachments if entry.source is not source]
 
     def cycle(self, now: float, period: float) -> None:
-        """Run one cycle: states in, sources, targets out; times in [s]."""
-        # whatever is wrong with one drive is reported, and stops it; the others are served
+        """Run one cycle: read states, update sources, write targets; times are in [s]."""
+        # an error of one drive is reported and stops that drive; the others continue
         for drive in self.drives.values():
             try:
                 drive.read()
@@ -143,7 +143,7 @@ class MotionGroup:
         drive.stream(setpoint)
 
     def _release(self, drive: Axis, refusal: Refusal) -> None:
-        """Release a drive; a source that waits for it does not get it back."""
+        """Release a drive from its source, and notify sources that had lost it before."""
         for attachment in self._attachments:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)
@@ -171,7 +171,7 @@ class MotionGroup:
 
 
 def _feedback(drive: Axis) -> AxisFeedback:
-    """Return the state of a drive for its source; one for which that fails is stopped."""
+    """Return the state of a drive for its source; stop the drive if that fails."""
     try:
         return drive.feedback()
     except Exception as error:  # noqa: BLE001
@@ -184,7 +184,7 @@ def _feedback(drive: Axis) -> AxisFeedback:
 
 
 def _greatest_speed(drive: Axis) -> float:
-    """Return the speed in user units per second above which a stream is no motion any more."""
+    """Return the speed in user units per second above which a step of a stream is a jump."""
     parameters = drive.view.parameters
     if parameters.speed_limit is not None:
         return SPEED_MARGIN * parameters.speed_limit
@@ -194,16 +194,16 @@ def _greatest_speed(drive: Axis) -> float:
 
 @dataclass(frozen=True, slots=True)
 class StopReport:
-    """What became of the drives, by name."""
+    """Result of stopping all drives, by name."""
 
-    stopped: tuple[str, ...]  # they moved, and stand now; still under power
-    # they did not move visibly, and no target of before moves them any more
+    stopped: tuple[str, ...]  # drives that moved and now stand, still powered
+    # drives that showed no motion; no earlier target moves them any more
     standing: tuple[str, ...]
-    unpowered: tuple[str, ...]  # they are not enabled, so nothing moves them
-    failed: tuple[str, ...]  # why it is not known that they stand, each with its name
+    unpowered: tuple[str, ...]  # drives that are not enabled
+    failed: tuple[str, ...]  # drives not confirmed at rest, each as name and reason
 
     def __str__(self) -> str:
-        """Return it in a sentence, what is worst first."""
+        """Return a sentence, with failures first."""
         named = (
             ('NOT known to stand', '; '.join(self.failed)),
             ('stopped', ', '.join(self.stopped)),
@@ -214,9 +214,9 @@ class StopReport:
 
 
 async def stop_all(commands: Sequence[AxisCommands], scheduler: Scheduler) -> StopReport:
-    """Halt all drives, whatever moves them, and wait until each stands or has no power.
+    """Halt all drives and wait until each stands or has no power.
 
-    One that does not come to rest keeps no other from it.
+    A drive that does not come to rest does not delay the others.
     """
     ends = [scheduler.spawn(_stopped(each, scheduler)) for each in commands]
     outcomes = [await end for end in ends]
@@ -229,7 +229,7 @@ async def stop_all(commands: Sequence[AxisCommands], scheduler: Scheduler) -> St
 
 
 async def _stopped(commands: AxisCommands, scheduler: Scheduler) -> tuple[str, str]:
-    """Halt a drive; return its field of StopReport, and its name or why that is not known."""
+    """Halt a drive; return its field of StopReport, and its name or the reason of failure."""
     view = commands.axis.view
     moved = not view.stands
     try:
@@ -241,7 +241,7 @@ async def _stopped(commands: AxisCommands, scheduler: Scheduler) -> tuple[str, s
         await commands.stops.at_rest(BRAKED_TIMEOUT)
     except CanopenError as error:
         return 'failed', str(error)
-    if view.state is DriveState.FAULT:  # its own reaction has ended its motion
+    if view.state is DriveState.FAULT:  # its fault reaction has ended its motion
         return 'unpowered', f'{view.name} (faulted)'
     if view.shown_state is DriveState.UNKNOWN:
         return 'failed', f'{view.name}: {commands.axis.describe()}'
@@ -251,12 +251,12 @@ async def _stopped(commands: AxisCommands, scheduler: Scheduler) -> tuple[str, s
 
 
 async def _to_its_end(halt: Promise[str], commands: AxisCommands, scheduler: Scheduler) -> None:
-    """Wait for a stop, or for the one that has taken its place."""
+    """Wait for a stop command, or for the one that replaces it."""
     while True:
         try:
             await halt
-        except CanopenError:  # noqa: PERF203  # the other one may be replaced, too
-            await scheduler.timer(0.0)  # until the other one has begun
+        except CanopenError:  # noqa: PERF203  # the replacement may also be replaced
+            await scheduler.timer(0.0)  # until the replacement has begun
             other = commands.stopping
             if other is None or other is halt:
                 raise

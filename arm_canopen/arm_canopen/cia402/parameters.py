@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that the master reads from a drive once it is booted, by SDO; and known deviations.
+"""Parameters that the master reads from a drive by SDO after its boot, and known quirks.
 
-Where a kind of drives deviates from CiA 402, ``quirks: NAME`` in bus.yml names a row of
+For drives that deviate from CiA 402, ``quirks: NAME`` in bus.yml selects an entry of
 :data:`QUIRKS`.
 """
 
@@ -20,11 +20,11 @@ from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
 from .units import INT32_MAX, Units
 
-RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again
-READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has its time
-SPEED_SHARE = 0.1  # share of 0x607F with which drives without 0x6081 move
-RANGE_TIME = 10.0  # [s] in which those without 0x607F, too, cross their range (0x607D)
-RAMP_TIME = 0.5  # [s] in which drives without 0x6083 get to their profile velocity
+RETRY_PERIOD = 1.0  # [s] until a failed reading is repeated
+READ_TIMEOUT = 0.5  # [s] long enough for slow devices, as nothing waits for these answers
+SPEED_SHARE = 0.1  # profile velocity of drives without 0x6081, as share of 0x607F
+RANGE_TIME = 10.0  # [s] to cross the range (0x607D), for drives without 0x6081 and 0x607F
+RAMP_TIME = 0.5  # [s] to reach the profile velocity, for drives without 0x6083
 DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without any of these: slow, but moving
 DEFAULT_ACCELERATION = DEFAULT_VELOCITY / RAMP_TIME  # [unit/s^2]
 OFFSET_OBJECTS: dict[OperationMode, Index] = {
@@ -42,12 +42,12 @@ class ProfileLimits:
     velocity: float  # largest speed towards a single target in [unit/s]
     acceleration: float  # largest acceleration in [unit/s^2]
     deceleration: float  # largest deceleration in [unit/s^2]
-    # largest speed along a stream of targets in [unit/s], where that is more
+    # largest speed along a stream of targets in [unit/s], if higher than ``velocity``
     speed_limit: float = 0.0
 
 
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
-NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 and 0x6067 with which nothing is monitored
+NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 and 0x6067 that disable monitoring
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
 
 ADDRESSES: tuple[tuple[int, int], ...] = (
@@ -74,38 +74,38 @@ REFRESHED = frozenset(index for index, _ in ADDRESSES) - {Index.SUPPORTED_MODES}
 
 @dataclass(frozen=True, slots=True)
 class DriveParameters:
-    """Parameters of one drive; None where the drive does not have them."""
+    """Parameters of one drive; None for objects that the drive lacks."""
 
     supported_modes: int | None = None  # bits of 0x6502
     homing_method: int = 0  # 0x6098
-    # software limits 0x607D less the home offset 0x607C in user units, lower first; not beyond
-    # where positions wrap (0x607B), as an axis would not be seen where it was sent
+    # software limits 0x607D minus the home offset 0x607C in user units, lower first; within the
+    # range at which positions wrap (0x607B), as feedback could not show a target beyond it
     position_limits: tuple[float, float] | None = None
     speed_limit: float | None = None  # 0x607F in user units per second
     effort_limit: float | None = None  # 0x6072 in user units
-    # 0x6065 in user units; None where nothing is monitored, too
+    # 0x6065 in user units; also None if monitoring is disabled
     following_window: float | None = None
-    position_window: float | None = None  # the same of 0x6067
-    # limits for profiles of the master's own, from 0x6081, 0x6083, 0x6084 and 0x607F
+    position_window: float | None = None  # 0x6067, likewise
+    # limits for profiles that the master generates, from 0x6081, 0x6083, 0x6084 and 0x607F
     profile: ProfileLimits = DEFAULT_PROFILE
     # 0x6085 in user units per second squared
     quick_stop_deceleration: float = DEFAULT_ACCELERATION
-    # greatest change of a torque that the master ramps, in user units per second, from 0x6087
+    # largest torque slope for ramps of the master in user units per second, from 0x6087
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
-    # 0x6081 in device units; None when the drive has none, or a PDO carries it
+    # 0x6081 in device units; None if the drive lacks it or a PDO carries it
     profile_velocity_inc: int | None = None
-    # what the drive adds to the targets of its cyclic modes (0x60B0 to 0x60B2) in device units, by
-    # object of the first axis
+    # offsets that the drive adds to cyclic targets (0x60B0 to 0x60B2) in device units, by object
+    # of the first axis
     offsets: Mapping[int, int] = field(default_factory=dict)
-    units: str = 'bus.yml'  # in words, where the units come from
+    units: str = 'bus.yml'  # source of the units, in words
 
     def supports(self, mode: OperationMode) -> bool:
-        """Whether the drive has a mode; one without 0x6502 is believed to have all."""
+        """Return whether the drive supports a mode; without 0x6502 it is assumed to."""
         return self.supported_modes is None or bool(self.supported_modes & mode.support_bit)
 
 
 class ParameterCache:
-    """The parameters of one axis: read after each boot, and again after each change."""
+    """Cache of the parameters of one axis, read after each boot and each change."""
 
     def __init__(
         self,
@@ -115,14 +115,14 @@ class ParameterCache:
         scheduler: Scheduler,
         warn: Callable[[str], None],
     ) -> None:
-        """Its units become the drive's own where bus.yml gives none."""
-        self.parameters = DriveParameters()  # what the drive reported last
-        self.known = False  # they were read since its device was booted
+        """Set ``units`` from the drive if bus.yml defines none."""
+        self.parameters = DriveParameters()  # last parameters that the drive reported
+        self.known = False  # the parameters were read since the last boot
         self._node = node
         self._config = config
         self._units = units
         self._offset = AXIS_OFFSET * config.channel
-        self._units_from = ''  # they do not change while a device runs
+        self._units_from = ''  # source of the units, fixed while a device runs
         self._scheduler = scheduler
         self._warn = warn
         self._reading: Task[None] | None = None
@@ -130,11 +130,11 @@ class ParameterCache:
         node.sdo.on_download.append(self._object_downloaded)
 
     def begin(self) -> None:
-        """Read those of a device that was booted."""
+        """Read the parameters after the device has booted."""
         self._reading = self._scheduler.background(self._keep_reading())
 
     def forget(self, reason: str) -> None:
-        """The device is lost; what comes back may be another one."""
+        """Forget the parameters: the device is lost and may be replaced by another one."""
         self.known = self._outdated = False
         self._units_from = ''
         if self._reading is not None:
@@ -143,14 +143,14 @@ class ParameterCache:
     async def factor_group(
         self, addresses: Sequence[tuple[int, int]] = FACTOR_ADDRESSES
     ) -> FactorGroup:
-        """Read what the drive says about its increments; SdoError when it does not answer."""
+        """Read the factor group of the drive; raise SdoError if it does not answer."""
         held = await self._read_each(addresses)
         return FactorGroup.read(lambda index, subindex: held.get((index, subindex)))
 
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]
     ) -> None:
-        """One of the objects may be changed through this master, by whomever."""
+        """Read the parameters again when a client of this master changes one of them."""
         if index - self._offset in REFRESHED:
             end.when_done(self._object_written)
 
@@ -173,11 +173,11 @@ class ParameterCache:
             reason = await self._refresh()
 
     async def _refresh(self) -> str:
-        """Read the parameters; return why that could not be done, or nothing."""
+        """Read the parameters; return the reason for a failure, or an empty text."""
         self._outdated = False
         try:
             self.parameters = await self._read_all()
-        except SdoError as error:  # its limits are then unknown, not absent
+        except SdoError as error:  # then limits are unknown, not absent
             return str(error)
         if not self.known:
             self._warn_of_silence()
@@ -185,7 +185,7 @@ class ParameterCache:
         return ''
 
     def _warn_of_silence(self) -> None:
-        """Warn, after a boot, of parameters with which targets would move nothing."""
+        """Warn, after a boot, of parameters with which targets cause no motion."""
         used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
         if used and self.parameters.profile_velocity_inc == 0:
             self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
@@ -197,7 +197,7 @@ class ParameterCache:
             )
 
     async def _read_all(self) -> DriveParameters:
-        """Read them, as far as the EDS has them; what the drive lacks follows from its others."""
+        """Read the parameters in the EDS; derive missing ones from the others."""
         self._units_from = self._units_from or await self._read_units()
         held, units = await self._read_each(ADDRESSES), self._units
 
@@ -211,12 +211,12 @@ class ParameterCache:
         velocity = DEFAULT_VELOCITY
         lower, upper = (held[Index.SOFTWARE_POSITION_LIMIT, subindex] for subindex in (1, 2))
         if lower is not None and upper is not None and lower < upper:
-            # as targets go, which they are limits of; they count from home, not from zero
+            # scaled like targets, which they limit; they count from home, not from zero
             offset = value(Index.HOME_OFFSET)
             low, high = sorted(units.position.commanded(end - offset) for end in (lower, upper))
             position_limits, velocity = (low, high), (high - low) / RANGE_TIME
         lower, upper = (value(Index.POSITION_RANGE_LIMIT, subindex) for subindex in (1, 2))
-        if -INT32_MAX < lower < upper < INT32_MAX:  # with 0 and 0, or all that 0x6064 holds, none
+        if -INT32_MAX < lower < upper < INT32_MAX:  # 0 and 0, or all of INT32: no limits
             ends = sorted(units.position.commanded(end) for end in (lower, upper))
             low, high = position_limits or ends
             position_limits = max(low, ends[0]), min(high, ends[1])
@@ -261,7 +261,7 @@ class ParameterCache:
         )
 
     async def _read_units(self) -> str:
-        """Use the units of the factor group (CiA 402-2, clause 8); report where they are from."""
+        """Use the units of the factor group (CiA 402-2, clause 8); return their source."""
         config, source = self._config, 'bus.yml'
         if not config.scale_from_factor_group and config.scale_acc_from_dev is not None:
             return source
@@ -292,7 +292,7 @@ class ParameterCache:
     async def _read_each(
         self, addresses: Sequence[tuple[int, int]]
     ) -> dict[tuple[int, int], int | None]:
-        """Read objects of the profile; None for those that the drive lacks."""
+        """Read CiA 402 objects of this axis; None for those that the drive lacks."""
         return {address: await self._read(*address) for address in addresses}
 
     async def _read(self, index: int, subindex: int = 0) -> int | None:
@@ -305,18 +305,18 @@ class ParameterCache:
                 profile_index, subindex, timeout=READ_TIMEOUT
             )
         except (SdoAbortError, CodecError):
-            return None  # a drive may lack what its EDS promises; the default stands
+            return None  # a drive may lack objects of its EDS; the default applies
         return value if isinstance(value, int) else None
 
 
 @dataclass(frozen=True, slots=True)
 class Quirks:
-    """How one kind of drive deviates."""
+    """Deviations of one kind of drive from CiA 402."""
 
-    state_timeout: float = 5.0  # time for all steps to a state in [s], as ros2_canopen has it
+    state_timeout: float = 5.0  # time for all steps to a state in [s], as in ros2_canopen
     mode_timeout: float = 5.0  # time for 0x6061 to follow 0x6060 in [s]
-    homed_without_arrival: bool = False  # the end of homing is bit 12 alone; bit 10 never comes
-    # 0x6060 = 0 is refused, so the mode that the drive has is kept selected
+    homed_without_arrival: bool = False  # only bit 12 shows the end of homing, never bit 10
+    # the drive refuses 0x6060 = 0, so its present mode stays selected
     no_mode_zero: bool = False
 
 
@@ -330,14 +330,14 @@ QUIRKS: dict[str, Quirks] = {
     'homing_bit_12_only': Quirks(homed_without_arrival=True),
     # drives that answer 0x6060 = 0 with an abort, or ignore it
     'no_mode_zero': Quirks(no_mode_zero=True),
-    # large drives that discharge and charge their link when they are switched
+    # large drives that discharge and charge their DC link when they are switched
     'slow_states': Quirks(state_timeout=20.0),
 }
 """By name; the sources are the reports of users."""
 
 
 def quirks_of(name: str) -> Quirks:
-    """Return the quirks of a name in bus.yml."""
+    """Return the quirks that a name in bus.yml selects."""
     try:
         return QUIRKS[name]
     except KeyError:

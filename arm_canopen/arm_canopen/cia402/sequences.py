@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The long commands of an axis: its stops, homing, and a stream of targets that may pause."""
+"""Stops and homing of an axis, and supervision of a stream of targets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .state import POWERED
 from .steps import AxisSteps
 from .stop import STOP_TIMEOUT
 
-BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of the ramp
+BRAKED_TIMEOUT = 10.0  # [s] for a halt to reach standstill, added to the time of the ramp
 
 
 class StopCommands:
@@ -34,7 +34,7 @@ class StopCommands:
         self._scheduler = scheduler
 
     async def disable(self) -> str:
-        """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
+        """Disable to Switched On, as ros2_canopen's service does; the motor has no torque."""
         axis = self._axis
         if not await self._ready_to_stop('disabled'):
             return await self.shutdown()
@@ -45,9 +45,9 @@ class StopCommands:
         return await self.at_rest()
 
     async def halt(self) -> str:
-        """Brake and stay enabled (bit 8, option code 0x605D); the next single target goes on.
+        """Halt and stay enabled (bit 8, option code 0x605D) until the next single target.
 
-        A drive that this does not slow down, or that no PDO reaches, gets a quick stop.
+        A drive that does not slow down, or receives no PDO, gets a quick stop.
         """
         axis = self._axis
         if not await self._ready_to_stop('halted'):
@@ -57,13 +57,13 @@ class StopCommands:
         if not axis.stays_enabled:
             await self._stay_disabled()
             return f'nothing to halt: {await self.at_rest()}'
-        # whatever was about to lead it elsewhere
+        # any pending command
         axis.goal = DriveState.OPERATION_ENABLED
         await self._escalated(self._steps.come_to_halt(BRAKED_TIMEOUT))
         return axis.describe()
 
     async def quick_stop(self) -> str:
-        """Quick stop; what follows at rest depends on the drive's option code 0x605A."""
+        """Quick stop; option code 0x605A determines the state of the drive afterwards."""
         axis = self._axis
         reachable = await self._ready_to_stop('quick stop')
         if not reachable or axis.view.state is DriveState.OPERATION_ENABLED:
@@ -73,10 +73,10 @@ class StopCommands:
         return f'nothing to stop: {await self.at_rest()}'
 
     async def shutdown(self) -> str:
-        """Bring the drive to rest and take its power away.
+        """Bring the drive to rest and remove its power.
 
         Raises:
-            DriveError: It was not seen to rest without power.
+            DriveError: Feedback did not confirm rest without power.
         """
         axis = self._axis
         axis.interrupted = None
@@ -90,7 +90,7 @@ class StopCommands:
         return axis.describe()
 
     async def _quick_stop(self) -> str:
-        """Quick stop by whatever reaches the drive; one that goes on loses its power."""
+        """Quick stop by RPDO or SDO; remove power if the drive does not stop."""
         axis = self._axis
         axis.goal = DriveState.QUICK_STOP_ACTIVE
         await axis.stop.run(disables=False)
@@ -99,7 +99,7 @@ class StopCommands:
         return axis.describe()
 
     async def _escalated(self, stop: Coroutine[Promise[Any], None, None]) -> None:
-        """Await a stop; where it does not end in rest, what follows it: a quick stop at least."""
+        """Await a stop; if it fails, await the stop sequence or give a quick stop."""
         axis = self._axis
         try:
             await stop
@@ -115,9 +115,9 @@ class StopCommands:
                 raise
 
     async def at_rest(self, timeout: float = STOP_TIMEOUT) -> str:
-        """Describe the drive when it was seen to stand, in [s] beside the time of the ramp.
+        """Wait for standstill, ``timeout`` in [s] after the ramp; describe the drive.
 
-        Waits for the end of what a halt leaves alone, too: a quick stop, the reaction to a fault.
+        Also wait for the end of a quick stop or fault reaction, which a halt does not affect.
         """
         view = self._axis.view
 
@@ -135,7 +135,7 @@ class StopCommands:
             raise self._steps.refused('is not known to stand, as it was never booted')
 
     async def _ready_to_stop(self, reason: str) -> bool:
-        """End what moves the drive, now or later; True where PDOs can brake it."""
+        """Cancel current and pending motion; return True if PDOs can brake the drive."""
         axis = self._axis
         axis.interrupted = None
         axis.released(Refusal(RefusalCause.COMMANDED, reason))
@@ -145,12 +145,12 @@ class StopCommands:
         try:
             await self._steps.ready(to_stop=True)
         except DriveError:
-            return False  # it shows nothing, or not any more
+            return False  # it shows no state
         self._steps.require_no_fault()
         return True
 
     async def _stay_disabled(self) -> None:
-        """Prevent enabling, also where the command for it is on its way."""
+        """Prevent enabling, even if the command for it is pending."""
         axis, steps = self._axis, self._steps
         axis.leave_operation()
         await axis.stop.ended()
@@ -162,7 +162,7 @@ class StopCommands:
         )
 
     def _is_quick_stopped(self) -> bool:
-        """Whether a quick stop runs or has ended; then no lesser stop takes its place."""
+        """Return whether a quick stop runs or has ended; a weaker stop must not replace it."""
         axis = self._axis
         quick_stop = DriveState.QUICK_STOP_ACTIVE
         if axis.view.state is not quick_stop and axis.goal is not quick_stop:
@@ -171,14 +171,14 @@ class StopCommands:
         return True
 
 
-EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 cleared
+EDGE_CYCLES = 3  # SYNC cycles until a drive sees bit 4 cleared
 HOMING_START, START_CYCLES = 0.1, 6
 """Time in [s], and cycles of SYNC, after which a drive has overwritten the homing bits of the
 last time: with a slow SYNC it gets its start later."""
 
 
 class HomingProgress(Enum):
-    """What happens at the moment."""
+    """Current phase of homing."""
 
     ENABLING = 'enabling'
     SWITCHING = 'switching to mode 6'
@@ -191,11 +191,10 @@ async def home(
     method: int | None = None,
     notify: Callable[[HomingProgress], None] = lambda progress: None,
 ) -> str:
-    """Home a drive that is enabled, by a method of 0x6098 or, with None, the one in the drive.
+    """Home an enabled drive by a method of 0x6098; None uses the method in the drive.
 
-    It is left in mode 6. Ended from outside, bit 4 is cleared, which interrupts the homing. A
-    method that is given is for this time only: whatever happens, 0x6098 gets back the one that the
-    drive had.
+    The drive stays in mode 6. Cancelling clears bit 4, which interrupts the homing. ``method``
+    applies to this run only: 0x6098 always gets its previous value back.
 
     Returns:
         What was done, in words.
@@ -229,7 +228,7 @@ async def home(
 
 
 async def _run(steps: AxisSteps, homing: Homing, what: str) -> None:
-    """Set bit 4 until the drive shows that it has ended, well or not."""
+    """Set bit 4 until the drive shows the end of homing, successful or not."""
     axis, view = steps.axis, steps.axis.view
 
     def is_cut() -> bool:  # it is not enabled any more: its homing bits mean nothing then
@@ -266,7 +265,7 @@ async def _run(steps: AxisSteps, homing: Homing, what: str) -> None:
 
 
 async def _stored_method(steps: AxisSteps) -> int:
-    """Return what is in 0x6098 now, which the end of the last homing may just have changed."""
+    """Return the present value of 0x6098, which the end of the last homing may have changed."""
     axis = steps.axis
     try:
         stored = await axis.node.objects.read_object(axis.view.at(Index.HOMING_METHOD))
@@ -276,7 +275,7 @@ async def _stored_method(steps: AxisSteps) -> int:
 
 
 def _put_back(steps: AxisSteps, method: int) -> None:
-    """Write a method without waiting, as there is no time to when the homing was cancelled."""
+    """Restore a method without waiting, as a cancelled homing must not wait."""
     axis = steps.axis
 
     def check(written: Promise[None]) -> None:
@@ -287,7 +286,7 @@ def _put_back(steps: AxisSteps, method: int) -> None:
 
 
 async def _choose(steps: AxisSteps, method: int) -> None:
-    """Write a method; an answer that is late may still be that of a drive that has taken it."""
+    """Write a method; after a time-out the drive may still have taken it."""
     axis = steps.axis
     try:
         await axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method)
@@ -296,12 +295,12 @@ async def _choose(steps: AxisSteps, method: int) -> None:
 
 
 class TargetStream:
-    """Targets on a topic, whose end no client announces.
+    """Stream of targets from a topic, whose end is not announced.
 
     A publisher cannot know that its drive was halted, homed or switched to a mode in which its
-    numbers mean something else, and a pause of it is no request: a stalled process and a network
-    make pauses, too. So a stream that a command has ended stays out, until a command that enables
-    the drive or selects a mode is given while no targets come.
+    values have another meaning. A pause is not a request either, as stalled processes and networks
+    cause pauses, too. So a stream that a command has ended stays blocked until a command enables
+    the drive or selects a mode while no targets arrive.
     """
 
     def __init__(
@@ -310,18 +309,18 @@ class TargetStream:
         scheduler: Scheduler,
         settle: Callable[[], Coroutine[Promise[Any], None, None]],
     ) -> None:
-        """``settle`` waits until the drive has shown what it makes of the last command."""
+        """``settle`` waits until feedback shows the effect of the last command."""
         self._axis = axis
         self._settle = settle
         self._scheduler = scheduler
         self._came = -math.inf
         self._goes_on_until = 0.0
         self._ended_by = ''
-        self._begun = False  # one has come since the last command that lets one in
+        self._begun = False  # a stream has begun since the last command that admits one
         self._watch: Task[None] | None = None
 
     def admit(self) -> None:
-        """Record a target of a stream."""
+        """Record a target of a stream; raise a DriveError if the stream is blocked."""
         self._came = self._scheduler.now
         if self._ended_by:
             raise DriveError(
@@ -331,25 +330,25 @@ class TargetStream:
         self._begun = True
 
     def follow(self, delivery: Promise[None]) -> None:
-        """A target was commanded: stop the drive when it refuses it, or no other one follows."""
+        """Supervise a target: stop the drive if it refuses it or no other target follows."""
         delivery.when_done(self._note_delivery)
         self._goes_on_until = self._scheduler.now + self._axis.config.target_timeout
         if self._watch is None or self._watch.done:
             self._watch = self._scheduler.background(self._watch_for_pause())
 
     def end(self, by: str) -> None:
-        """Keep streams out, because of a command in words."""
+        """Block streams because of a command, named by ``by``."""
         self._ended_by = by
         if self._watch is not None:
             self._watch.cancel(DriveError('the stream was ended by a command'))
 
     def interrupt(self, by: str) -> None:
-        """Keep out the stream that has begun, if one has; a pause may be a stall."""
+        """Block the stream that has begun, if any, even if it pauses."""
         if self._begun:
             self.end(by)
 
     def renew(self, by: str) -> None:
-        """Admit a stream that begins from now on, but not one that comes already."""
+        """Admit a stream that begins from now on, but not one that already arrives."""
         silence = self._scheduler.now - self._came
         if silence <= self._axis.config.target_timeout:
             self.end(by)
@@ -369,7 +368,7 @@ class TargetStream:
             await self._scheduler.timer(self._goes_on_until - self._scheduler.now)
         axis = self._axis
         if not axis.accepts_targets:
-            return  # what has taken it away has reported it
+            return  # the cause has already been reported
         paused = f'the stream of targets has paused for {axis.config.target_timeout * 1000:g} ms'
         if axis.mode.setpoint is not None and not axis.mode.cyclic:
             axis.warn(f'{paused}: it goes on to the last target, and rests there')

@@ -33,64 +33,64 @@ from .parameters import DriveParameters, OFFSET_OBJECTS, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
-EMCY_AGE_MAX = 0.2  # [s] of an EMCY that came with a fault
+EMCY_AGE_MAX = 0.2  # [s] largest age of an EMCY that belongs to a fault
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which it may move under power, and falls or coasts when that goes."""
 LOOK_PERIOD = 0.02  # [s] between two readings by SDO of what TPDOs do not show
-LOOK_AGE_MAX = 0.5  # [s] of such a reading
+LOOK_AGE_MAX = 0.5  # [s] largest age of such a reading
 REST_SHARE = 0.002  # share of the profile velocity below which an axis counts as standing
-REST_TIME = 0.004  # [s] within which one that counts as standing could stop
+REST_TIME = 0.004  # [s] within which an axis that counts as standing could stop
 NOISE_DEV = 2  # units of 0x606C, and increments within the window, that noise of sensors may be
-UNDECODED_MAX = 0.2  # [s] for which a statusword without a state counts as a lost TPDO
-WINDOW = 0.1  # [s] of positions that the estimate looks back on
+UNDECODED_MAX = 0.2  # [s] in which a statusword without a valid state counts as a lost TPDO
+WINDOW = 0.1  # [s] of positions used for the velocity estimate
 FLICKER_INC = 1  # [inc] by which an encoder at rest may change
 WARNINGS = int(Statusword.WARNING | Statusword.INTERNAL_LIMIT)
 
 
 @dataclass(frozen=True, slots=True)
 class DriveStatus:
-    """How a drive was at one moment, for other threads and for people."""
+    """Snapshot of the state of one drive, for other threads and for display."""
 
     name: str  # name of the axis
-    node: NodeStatus  # the device below it
+    node: NodeStatus  # status of its device
     state: DriveState  # state of the power drive system
     mode: str  # mode of operation in words
     statusword: str  # 0x6041 in words
     warning: bool  # the statusword shows a warning or an internal limit
-    error: str  # 0x603F in words, empty when none is known
+    error: str  # 0x603F in words, empty if unknown
     failure: str  # why the master stopped it, until it is enabled again; else empty
-    fresh: bool  # state, position and velocity are young enough to act on
-    age: float  # age of the oldest of them in [s]; infinite while they are unknown
+    fresh: bool  # state, position and velocity are recent enough to act on
+    age: float  # age of the oldest of these values in [s]; infinite while unknown
     position: float  # actual position in user units
     velocity: float  # actual velocity in user units per second
-    setpoint: float  # position last commanded in user units
-    following_error: float  # set-point that was sent before the position was measured, minus that
-    summary: str  # all of it in a sentence
+    setpoint: float  # last commanded position in user units
+    following_error: float  # set-point sent before the measurement minus position, in user units
+    summary: str  # all of this in a sentence
 
     @property
     def faulted(self) -> bool:
-        """Whether the drive is in a fault or on the way to it."""
+        """Whether the drive is in Fault or Fault Reaction Active."""
         return self.state in FAULTY
 
 
 class VelocityEstimate:
-    """The rate of 0x6064 over a short window."""
+    """Estimate of the velocity from 0x6064 over a short window."""
 
     def __init__(self, poll_period: float = 0.0, *, on_change: bool = False) -> None:
         """Estimate over a window of its own length.
 
         Args:
-            poll_period: Of positions that are read by SDO in [s]; 0 where a PDO carries them.
-            on_change: They come when they change, so that one which has not come is still true.
+            poll_period: Period of SDO polling in [s]; 0 if a PDO carries the positions.
+            on_change: Positions are sent only on change, so the last one stays valid.
         """
-        self.window = max(WINDOW, 2.5 * poll_period)  # its length in [s]
+        self.window = max(WINDOW, 2.5 * poll_period)  # length of the window in [s]
         self._on_change = on_change
         self._positions: deque[tuple[float, float]] = deque()
 
     def note(self, now: float, position_inc: float, stamp: float | None = None) -> None:
         """Add a position in [inc] at a steady time in [s].
 
-        Where they come on change, one whose ``stamp`` is as old as the window is still true.
+        With ``on_change`` a position with a ``stamp`` as old as the window is still valid.
         """
         positions = self._positions
         if stamp is not None:
@@ -125,20 +125,19 @@ class VelocityEstimate:
 
 
 class Actual(NamedTuple):
-    """Where a drive is, or is held."""
+    """Actual or held position of a drive, with velocity and torque."""
 
-    # in [inc], as the drive reports it, so that no factor in bus.yml can make the target another
-    # one
+    # in [inc], as the drive reports it, so that no factor in bus.yml can change the holding target
     position_inc: int
-    velocity: float = 0.0  # in user units per second; a moving drive is braked from it
+    velocity: float = 0.0  # in user units per second; braking starts from it
     velocity_dev: int = 0  # the same in device units, as the drive reports it
     torque: int = 0  # 0x6077 in device units, 0 when it is unknown
 
 
 class AxisState:
-    """What the master knows of an axis; everything that needs its state reads it here.
+    """State of an axis as the master knows it, the only source of it for other classes.
 
-    :meth:`observe` makes it once a cycle. Positions, velocities and efforts are in user units; a
+    :meth:`observe` updates it once a cycle. Positions, velocities and efforts are in user units; a
     name with ``_inc`` or ``_dev`` is in device units.
     """
 
@@ -149,29 +148,29 @@ class AxisState:
         config: DriveConfig,
         warn: Callable[[str], None],
     ) -> None:
-        """Bind each object to its PDO; what the drive has but no PDO carries is read by SDO."""
+        """Bind each object to its PDO; objects that no PDO carries are read by SDO."""
         self.node = node  # the device
         self.config = config  # settings of the axis
         self.name = config.name or node.name  # of its channel for a device with several axes
         self.units = Units(config)
         self.cache = ParameterCache(node, config, self.units, scheduler, warn)
-        self.state = DriveState.UNKNOWN  # of the power drive system
-        self.statusword = 0  # 0x6041, the last one that shows a state
-        self.mode = 0  # that the drive displays (0x6061); 0 while unknown
-        # 0x6041 where it shows no state (no row of CiA 402-2, table 31); state and statusword
-        # stay the last known ones, and are soon no longer fresh
+        self.state = DriveState.UNKNOWN  # state of the power drive system
+        self.statusword = 0  # last 0x6041 with a valid state
+        self.mode = 0  # displayed mode (0x6061); 0 while unknown
+        # 0x6041 if it shows no valid state (no row of CiA 402-2, table 31); state and statusword
+        # then keep their last values, and are soon no longer fresh
         self.undecoded: int | None = None
         self._decoded_at = -math.inf
-        self.fresh = False  # the TPDOs with all of this are young enough to act on
-        # actual position, and 0x6064; the last ones of a lost drive, NaN before the first
+        self.fresh = False  # the TPDOs with all of this are recent enough to act on
+        # actual position, and 0x6064; the last values of a lost drive, NaN before the first
         self.position = self.position_inc = math.nan
         self.velocity_dev: float | None = None  # 0x606C; None without a PDO, or while unknown
-        self.error = ''  # 0x603F in words when it was faulted last
-        self.held_torque = 0  # 0x6077, while a torque takes over that no TPDO brings
+        self.error = ''  # 0x603F in words at the last fault
+        self.held_torque = 0  # 0x6077 by SDO for entering a torque mode, without a TPDO
         self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
-        self._looking = 0  # how many look by SDO
+        self._looking = 0  # number of tasks that poll by SDO
         self._confirmed: int | None = None  # positions received until SDO showed the last one
         objects, image = node.objects, node.image
         self._statusword = objects.reader(self.at(Index.STATUSWORD))
@@ -199,29 +198,29 @@ class AxisState:
 
     @property
     def parameters(self) -> DriveParameters:
-        """What it reported about itself."""
+        """Parameters that the drive reported."""
         return self.cache.parameters
 
     @property
     def seen(self) -> bool:
-        """Whether its state is young enough to judge a stop by, from TPDOs or read by SDO."""
+        """Whether its state, by TPDO or SDO, is recent enough to judge a stop."""
         return self.fresh or self._looks
 
     @property
     def _looks(self) -> bool:
-        """Whether :meth:`look` has shown the state that TPDOs do not show."""
+        """Whether :meth:`look` has read the state recently, while TPDOs do not show it."""
         if self.fresh or self._looked is None:
             return False
         return self._scheduler.now - self._looked_at <= LOOK_AGE_MAX
 
     @property
     def age(self) -> float:
-        """Age of the oldest value of its state in [s]; infinite while there is none."""
+        """Age of the oldest value of its state in [s]; infinite while unknown."""
         return math.inf if self.state is DriveState.UNKNOWN else self.silence
 
     @property
     def silence(self) -> float:
-        """Time since the oldest of its TPDOs came in [s]."""
+        """Time since the arrival of the oldest of its TPDOs in [s]."""
         return self._scheduler.now - min(source.timestamp for source in self._sources)
 
     @property
@@ -231,31 +230,31 @@ class AxisState:
 
     @property
     def positions_received(self) -> int:
-        """How many TPDOs with 0x6064 have come."""
+        """Number of TPDOs with 0x6064 received."""
         return self._position.source.count
 
     @property
     def velocity(self) -> float:
-        """Actual velocity; from the positions where no PDO has it."""
+        """Actual velocity, estimated from positions if no PDO carries it."""
         reported = self.velocity_dev
         return self.rate if reported is None else self.units.velocity.from_device(reported)
 
     @property
     def rate(self) -> float:
-        """Rate of the actual position, a few cycles late."""
+        """Velocity estimated from the actual position, delayed by a few cycles."""
         return self.units.distance.from_device(self._estimate.rate)
 
     @property
     def speed(self) -> float:
-        """Greatest speed that anything shows."""
+        """Greatest speed by any measurement."""
         return max(abs(self.velocity), abs(self.rate))
 
     @property
     def stands(self) -> bool:
-        """Whether the axis was seen to stand; a real encoder is never quite still.
+        """Whether feedback confirms that the axis stands, apart from encoder noise.
 
-        Both 0x606C and the rate of the position have to be slow, and seen; of each its own noise
-        counts as rest.
+        Both 0x606C and the rate of the position have to be known and slow; each has its own
+        noise threshold.
         """
         rest = self.rest_speed
         if not self.speed_known or abs(self.rate) > rest:
@@ -264,12 +263,12 @@ class AxisState:
 
     @property
     def speed_known(self) -> bool:
-        """Whether it was seen for long enough to distinguish motion from rest."""
+        """Whether feedback covers enough time to distinguish motion from rest."""
         return self.seen and self._estimate.known and not self._may_have_moved
 
     @property
     def _may_have_moved(self) -> bool:
-        """Whether it is looked at, and its last position neither came just now nor by SDO."""
+        """Whether its last position is neither recent nor confirmed by SDO, while it is polled."""
         position = self._position
         return (
             self._looking > 0
@@ -281,9 +280,9 @@ class AxisState:
 
     @property
     def rest_speed(self) -> float:
-        """Rate of the position up to which the axis counts as standing.
+        """Speed up to which the axis counts as standing.
 
-        By its own limits, and not below what its encoder resolves.
+        It follows from the limits of the axis, and is not below the encoder resolution.
         """
         profile, units = self.parameters.profile, self.units
         noise = abs(units.distance.from_device(NOISE_DEV / self._estimate.window))
@@ -307,16 +306,16 @@ class AxisState:
 
     @property
     def ready(self) -> bool:
-        """Whether its state and its parameters are known."""
+        """Whether state and parameters are known."""
         return self.fresh and self.cache.known and self.state is not DriveState.UNKNOWN
 
     def statusword_came(self, since: float) -> bool:
-        """Return whether 0x6041 has come since a time in [s]; one that comes on change has."""
+        """Return whether 0x6041 arrived since a time in [s]; True if it is sent on change."""
         source = self._statusword.source
         return source.timestamp > since or source.stale_after == math.inf
 
     def held_target(self, mode: OperationMode) -> int | None:
-        """Target and offset of a mode in the RPDOs in device units; None when none carries it."""
+        """Return target plus offset of a mode in the RPDOs, in device units, else None."""
         index, subindex = TARGET_OBJECTS[mode]
         value = self.node.image.commanded(self.at(index), subindex)
         offset = OFFSET_OBJECTS.get(mode)
@@ -325,12 +324,12 @@ class AxisState:
         return int(value) + (0 if offset is None else self.offset(offset))
 
     def offset(self, index: Index) -> int:
-        """Return what the drive adds to a target: as the RPDOs carry it, else as it was read."""
+        """Return an offset that the drive adds to a target: from the RPDOs, else as read."""
         value = self.node.image.commanded(self.at(index))
         return self.parameters.offsets.get(index, 0) if value is None else int(value)
 
     def error_of_emcy(self) -> str:
-        """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
+        """Return the error of a recent EMCY, used until 0x603F is read; empty for none."""
         emergency = self.node.emergencies.since(self._scheduler.now - EMCY_AGE_MAX)
         return '' if emergency is None else error_code_text(emergency.code)
 
@@ -363,30 +362,30 @@ class AxisState:
 
     @property
     def shown_state(self) -> DriveState:
-        """State that 0x6041 shows now; UNKNOWN where it shows none."""
+        """State in the last 0x6041; UNKNOWN if it shows no valid state."""
         return self.state if self.undecoded is None else DriveState.UNKNOWN
 
     @property
     def word_text(self) -> str:
-        """0x6041 in words, as it came."""
+        """Last received 0x6041 in words."""
         if self.undecoded is None:
             return statusword_text(self.statusword)
         before = self.state.title
         return f'{statusword_text(self.undecoded)}, no state of CiA 402 (before: {before})'
 
     async def read_error_code(self) -> None:
-        """Read 0x603F, so that the answer can name the error."""
+        """Read 0x603F, so that messages can name the error."""
         index = self.at(Index.ERROR_CODE)
         if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
             return
         try:
             code = await self.node.objects.read_object(index)
         except (SdoError, CodecError):
-            return  # the statusword says that there is a fault, only its code stays unknown
+            return  # the statusword shows the fault; only its code stays unknown
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
     def observe(self) -> None:
-        """Read state and position from the process image, or from the last look by SDO."""
+        """Update state and position from the process image, or the last reading by SDO."""
         now = self._scheduler.now
         shown = position = None
         self.fresh = False
@@ -420,7 +419,7 @@ class AxisState:
         self._decode(word)
 
     def _decode(self, word: int) -> None:
-        """Keep the state before a word that shows none; soon that is not fresh any more."""
+        """Decode a statusword; keep the last state if it shows none, which soon becomes stale."""
         now = self._scheduler.now
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             state = drive_state(word)
@@ -432,7 +431,7 @@ class AxisState:
         self.undecoded, self._decoded_at = None, now
 
     def lose_sight(self) -> None:
-        """Forget the state; the position stays the last one."""
+        """Forget the state; keep the last position."""
         self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
         self.fresh, self.velocity_dev, self.undecoded = False, None, None
         self._decoded_at = -math.inf
@@ -442,7 +441,7 @@ class AxisState:
     async def look(self) -> DriveState:
         """Read statusword and position by SDO, and return the state.
 
-        What is not answered stays unknown.
+        An object that the device does not answer stays unknown.
         """
         objects, begin = self.node.objects, self._scheduler.now
         try:
@@ -459,9 +458,9 @@ class AxisState:
         return self.state if state is DriveState.UNKNOWN else state  # it may still be powered
 
     async def confirm(self) -> bool:
-        """Read by SDO what a lost TPDO may have changed; return whether anything differs.
+        """Read by SDO the values that lost TPDOs may have carried; return whether any differs.
 
-        State, mode, position and velocity as read take the place of those of the last TPDOs.
+        The values read of state, mode, position and velocity replace those of the last TPDOs.
         """
         differs = False
         for index, reader in (
@@ -480,7 +479,7 @@ class AxisState:
             if reader is self._position:
                 self._confirmed = count if value == reader.value else None
             if not isinstance(value, int) or reader.source.count != count:
-                continue  # a TPDO that came meanwhile is newer, or as new
+                continue  # a TPDO received meanwhile is at least as new
             if reader.value not in (None, value):
                 reader.correct(value)
                 differs = True
@@ -491,9 +490,9 @@ class AxisState:
 
     @contextmanager
     def looking(self) -> Iterator[None]:
-        """Read by SDO periodically while TPDOs do not show the state, or may have got lost.
+        """Poll by SDO while TPDOs do not show the state, or may be lost.
 
-        Where the loss of its position goes unnoticed, an axis is seen to stand by SDO only.
+        If a lost position TPDO goes unnoticed, only SDO can confirm that the axis stands.
         """
         self._looking += 1
         self._confirmed = None
@@ -510,7 +509,7 @@ class AxisState:
             await (self.confirm() if self.fresh else self.look())
 
     def actual(self) -> Actual:
-        """Return where the drive is, and the velocity from which it has to be braked.
+        """Return the actual position, and the velocity at which braking starts.
 
         The velocity is the lesser of 0x606C and the rate of 0x6064: a wrong one must not
         set an axis in motion that stands.
@@ -542,7 +541,7 @@ class AxisState:
         failure: str = '',
         summary: str = '',
     ) -> DriveStatus:
-        """Return a snapshot, with what is commanded to the axis."""
+        """Return a snapshot that includes the commanded set-point."""
         return DriveStatus(
             name=self.name,
             node=node_status(self.node, self._scheduler.now),

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The power drive system's state machine from the master's side (CiA 402-2, figure 4, table 28).
 
-One table: which command leads from the state that the drive shows towards the one that is wanted.
+One table gives the command that leads from the displayed state towards the wanted one.
 Bits of the operation mode are added elsewhere. :class:`ControlwordOutput` sends the result by
-RPDO, or by SDO while the RPDO is kept back.
+RPDO, or by SDO while the RPDO is suspended.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 
 _S = DriveState
-RESET_PULSE = 0.05  # [s] for which bit 7 of a fault reset is set at least, and then cleared
+RESET_PULSE = 0.05  # [s] shortest time for which bit 7 of a fault reset is set, and then cleared
 
 
 class Command(IntEnum):
@@ -82,10 +82,10 @@ def next_command(state: DriveState, target: DriveState) -> Command:
 
 
 def fault_reset(state: DriveState, elapsed: float, period: float = 0.0) -> int:
-    """Return the controlword that resets a fault by its rising edge, again and again.
+    """Return the controlword of a fault reset: a rising edge of bit 7, repeated.
 
-    Each level lasts for two SYNC of a ``period`` in [s], and long enough for a drive that looks
-    at the controlword less often; ``elapsed`` is the time since the first in [s].
+    Each level lasts at least two SYNC periods (``period`` in [s]), and long enough for drives that
+    read the controlword less often; ``elapsed`` is the time since the first one in [s].
     """
     pulse = max(RESET_PULSE, 2.0 * period)
     if state is not DriveState.FAULT or int(elapsed / pulse) % 2:
@@ -106,7 +106,7 @@ class ControlwordOutput:
 
     @property
     def kept_back(self) -> bool:
-        """Whether an RPDO with the controlword is kept back, for this axis or another one."""
+        """Whether an RPDO with the controlword is suspended, for this axis or another one."""
         for output in self.outputs:  # noqa: SIM110  # in every cycle: half of what any() costs
             if output.kept_back_by:
                 return True
@@ -114,16 +114,16 @@ class ControlwordOutput:
 
     @property
     def keeps_back(self) -> bool:
-        """Whether it is kept back for this axis."""
+        """Whether an RPDO is suspended for this axis."""
         return any(self in output.kept_back_by for output in self.outputs)
 
     def keep_back(self) -> None:
-        """Keep every RPDO back that carries the controlword of this axis."""
+        """Suspend every RPDO that carries the controlword of this axis."""
         for output in self.outputs:
             output.kept_back_by.add(self)
 
     def send_again(self) -> None:
-        """Send them again, as far as no other axis keeps them back."""
+        """Resume these RPDOs, except those suspended for another axis."""
         for output in self.outputs:
             output.kept_back_by.discard(self)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The steps that commands to an axis are made of: each waits, and names what did not come."""
+"""Steps of commands to an axis; each waits for a condition and reports what was missing."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1
 BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
-REFUSED_SHARE = 0.5  # of a time-out, after which a drive counts as one that refuses
-SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
+REFUSED_SHARE = 0.5  # share of a time-out after which a drive counts as refusing
+SETTLE_CYCLES = 3  # SYNC cycles until feedback shows the effect of a command
 
 
 class AxisSteps:
@@ -40,7 +40,7 @@ class AxisSteps:
     def __init__(self, axis: Axis, scheduler: Scheduler) -> None:
         self.axis = axis
         self.quirks = quirks_of(axis.config.quirks)
-        # it refuses mode 0, or Operation enabled in that
+        # the drive refuses mode 0, or Operation enabled in mode 0
         self.needs_mode = self.quirks.no_mode_zero
         self._scheduler = scheduler
         self._keeps_mode_under_halt = False
@@ -51,12 +51,12 @@ class AxisSteps:
         return self._scheduler.now
 
     async def ready(self, *, to_stop: bool = False) -> None:
-        """Wait for state and parameters of a drive that has just come up.
+        """Wait for state and parameters of a drive that has just booted.
 
-        With ``to_stop`` a drive whose state is not fresh is ready, too.
+        With ``to_stop`` a drive without a fresh state is also ready.
 
         Raises:
-            DriveError: It is offline, is being stopped or could not be, or does not send them.
+            DriveError: It is offline, its stop runs or failed, or its state does not arrive.
         """
         axis = self.axis
         self._require_operational()
@@ -83,11 +83,11 @@ class AxisSteps:
         self._require_operational()
 
     async def reach(self, goal: DriveState) -> None:
-        """Lead to a state.
+        """Bring the drive to a state and wait for it.
 
         Raises:
-            DriveError: It is not reached; then the drive is led to Switch On Disabled. It is not
-                enabled where it does not take the value that holds it.
+            DriveError: The state is not reached; the drive is then disabled. It is not enabled if
+                it refuses the holding value.
         """
         axis = self.axis
         enabling = goal is DriveState.OPERATION_ENABLED
@@ -113,7 +113,7 @@ class AxisSteps:
             raise
 
     async def _begin_enabling(self) -> None:
-        """Clear what stopped it before, and hold it where it is."""
+        """Clear the cause of the last stop, and preload the actual position."""
         axis = self.axis
         if axis.stop.running:
             raise self.refused('is being stopped')
@@ -126,9 +126,9 @@ class AxisSteps:
             raise self.refused('is not enabled')
 
     async def _leave_quick_stop(self, timeout: float) -> None:
-        """Lead out of Quick stop active: by transition 16, or by 12 where the drive lacks that.
+        """Leave Quick stop active by transition 16, or by 12 if the drive lacks that.
 
-        ABB's FEPL-02 lacks it (its table of commands). One that still brakes keeps its power.
+        ABB's FEPL-02 lacks it (its table of commands). A drive that still brakes stays powered.
         """
         axis, view = self.axis, self.axis.view
 
@@ -145,7 +145,7 @@ class AxisSteps:
                 await self._scheduler.until(left, REACTION_TIME)
 
     async def _select_where_required(self, timeout: float) -> None:
-        """Select the mode of bus.yml for a drive that refuses Operation enabled without one.
+        """Select the mode of bus.yml for a drive that refuses Operation enabled in mode 0.
 
         An enabled drive shows within ``timeout`` in [s] that it does.
         """
@@ -187,7 +187,7 @@ class AxisSteps:
         return None
 
     def mode_to_return_to(self) -> Mode:
-        """Return the mode for the time after homing; mode 0 only where the drive takes it."""
+        """Return the mode to select after homing; mode 0 only if the drive accepts it."""
         axis = self.axis
         if axis.mode.number or not self.needs_mode:
             return axis.mode
@@ -197,7 +197,7 @@ class AxisSteps:
         return self._configured_mode() or axis.mode
 
     async def return_to(self, mode: Mode) -> None:
-        """Select the mode of before homing again; 0, which a drive may refuse, need not come."""
+        """Return to the mode before homing; tolerate a drive that refuses mode 0."""
         if mode.number and mode is not self.axis.mode:
             await self.switch(mode)
         elif not (mode.number or self.needs_mode):
@@ -241,9 +241,9 @@ class AxisSteps:
         return 0
 
     async def come_to_rest(self) -> None:
-        """Halt what moves before another mode ends it with a jerk; the drive stays halted.
+        """Halt a moving drive before a mode switch would stop it abruptly; it stays halted.
 
-        A torque is left alone: taking it away would drop a load.
+        A torque stays commanded: removing it would drop a load.
         """
         axis = self.axis
         acting = axis.holding_mode
@@ -257,7 +257,7 @@ class AxisSteps:
     async def come_to_halt(self, timeout: float) -> None:
         """Halt a drive that is enabled, and wait until it stands.
 
-        The ``timeout`` in [s] is beside the time of the ramp.
+        The ``timeout`` in [s] is added to the time of the ramp.
 
         Raises:
             DriveError: It does not come to rest; it stays halted.
@@ -288,10 +288,10 @@ class AxisSteps:
         axis.view.error = ''
 
     async def switch(self, mode: Mode) -> None:
-        """Switch in the state that bus.yml wants, then return to the state of before.
+        """Switch the mode in the state that bus.yml requires, then return to the previous state.
 
         Raises:
-            DriveError: 0x6061 does not show the mode in time; the one before is selected again.
+            DriveError: 0x6061 does not show the mode in time; the previous mode is restored.
         """
         axis = self.axis
         before, shown = axis.mode, axis.shown_mode
@@ -352,7 +352,7 @@ class AxisSteps:
             )
 
     async def _end_halt_at_rest(self, acting: Mode) -> None:
-        """Clear bit 8 where the drive stands; no older target acts then."""
+        """Clear bit 8 once the drive stands, when no older target can act."""
         axis = self.axis
         if acting.number in TORQUE_MODES:
             raise self.refused(
@@ -374,7 +374,7 @@ class AxisSteps:
             raise DriveError(f'{axis.name} stays halted: {NOT_TAKEN}')
 
     async def _clear_buffer(self) -> None:
-        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
+        """Clear and enable the buffer of mode 7, if the drive has one (0x60C4:06)."""
         axis = self.axis
         index = axis.view.at(Index.INTERPOLATION_CONFIGURATION)
         entry = axis.node.config.dictionary.get(index, BUFFER_CLEAR)
@@ -393,7 +393,7 @@ class AxisSteps:
                 return
 
     async def _written(self, index: int, subindex: int, value: int) -> SdoError | None:
-        """Write an object; return why that failed, or None."""
+        """Write an object; return the error, or None."""
         try:
             await self.axis.node.objects.write_object(index, subindex, value)
         except SdoError as error:
@@ -401,7 +401,7 @@ class AxisSteps:
         return None
 
     async def settle(self) -> None:
-        """Wait until the drive has shown what it makes of the command that was sent last."""
+        """Wait until feedback shows the effect of the last command."""
         await self.pause(SETTLE_CYCLES * self.axis.period)
 
     async def pause(self, duration: float) -> None:
@@ -411,12 +411,12 @@ class AxisSteps:
     async def until(
         self, condition: Callable[[], bool], timeout: float, what: str, remedy: str = ''
     ) -> None:
-        """Wait for a condition, ``what`` in words, for at most ``timeout`` in [s].
+        """Wait for a condition, described by ``what``, for at most ``timeout`` in [s].
 
-        The ``remedy`` helps where it takes longer and nothing else is known to keep the axis.
+        The error ends with ``remedy`` if no other reason for the time-out is known.
 
         Raises:
-            DriveError: It does not hold in time, or the drive faults or is lost before.
+            DriveError: The condition is not met in time, or the drive faults or is lost before.
         """
         try:
             await self._scheduler.until(lambda: condition() or self._is_hopeless(), timeout)
@@ -433,20 +433,20 @@ class AxisSteps:
         return not axis.node.operational or faulted or axis.stop.running
 
     def require_no_fault(self) -> None:
-        """Refuse to go on with a drive that is faulted."""
+        """Raise a DriveError if the drive is faulted."""
         if self.axis.view.state in FAULTY:
             raise self.refused('is faulted; recover it first')
 
     def refused(self, what: str) -> DriveError:
-        """Return an error with what went wrong, and the state of the axis."""
+        """Return an error that names the failure and the state of the axis."""
         return DriveError(f'{self.axis.name} {what}: {self.axis.describe()}')
 
     def way_to_enable(self) -> str:
-        """Name what enables the axis."""
+        """Return how to enable the axis, in words."""
         return 'recover it' if self.axis.view.state in FAULTY else 'init or enable it'
 
     def _why(self) -> str:
-        """Name the condition outside of the bus keeps the drive from being enabled."""
+        """Return which condition outside the bus prevents enabling, in words."""
         view = self.axis.view
         if view.undecoded is not None:
             return ' (its statusword shows no state of CiA 402)'

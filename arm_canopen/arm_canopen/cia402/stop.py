@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The stop of an axis: halt, then quick stop, then no power, until it was seen to rest.
+"""The stop of an axis: halt, then quick stop, then no power, until feedback confirms rest.
 
-What still reaches the drive commands it: its RPDO, else an SDO. A drive that one step does not
-slow down gets the next. "Unknown" is never "stopped". First :class:`Halt` (bit 8, and when it may
-be taken back), then :class:`BrakingWatch` (whether a stop slows it down), then
-:class:`StopSequence`.
+The drive is commanded by RPDO, else by SDO. If one step does not slow it down, the next one
+follows. "Unknown" is never "stopped". First :class:`Halt` (bit 8, and when it may be cleared),
+then :class:`BrakingWatch` (whether a stop slows the axis down), then :class:`StopSequence`.
 """
 
 from __future__ import annotations
@@ -31,14 +30,14 @@ from .state import AxisState, WINDOW
 from .state_machine import Command, ControlwordOutput
 
 HALT_BIT = int(Controlword.HALT)
-RESUME_TIMEOUT = 2.5  # [s] for which a halted drive may take to acknowledge a set-point
+RESUME_TIMEOUT = 2.5  # [s] for a halted drive to acknowledge a set-point
 UNDER_HALT_TIME = 0.5  # [s] for the acknowledge of a set-point while bit 8 is set
 RELEASED_TIME = 0.05  # [s] for it where bit 8 went with bit 4: an old move might go on meanwhile
 ANSWER_CYCLES = 5  # in which a drive answers what it sees, if that takes longer
 
 
 class HaltState(Enum):
-    """Whether an axis is halted, and what will end that."""
+    """Whether an axis is halted, and which event ends the halt."""
 
     ENDED = 'it is not halted'
     HELD = 'bit 8 is set, or the set-points were braked; no target is on its way'
@@ -48,12 +47,12 @@ class HaltState(Enum):
 
 
 class Halt:
-    """Holds a drive until a target that came later has been handed over.
+    """Halts a drive until it has taken a later target.
 
-    A set-point of mode 1 is offered while bit 8 is set, so that a move of before cannot go on. A
-    drive that does not acknowledge there gets it once more in the controlword that takes bit 8
-    back, and from then on always so; at the end of its halt it has no other target to go to.
-    Where that one is not acknowledged either, it is halted again.
+    A set-point of mode 1 is offered while bit 8 is set, so that an earlier move cannot resume. A
+    drive that does not acknowledge it gets it again in the controlword that clears bit 8, and from
+    then on always so; at the end of its halt it has no other target to go to. If it does not
+    acknowledge that one either, it is halted again.
     """
 
     def __init__(self) -> None:
@@ -66,29 +65,29 @@ class Halt:
 
     @property
     def held(self) -> bool:
-        """Whether the drive is halted; the next target ends it."""
+        """Whether the drive is halted; the next target ends the halt."""
         return self.state is not HaltState.ENDED
 
     @property
     def leaving(self) -> bool:
-        """Whether a target is on its way that will end it."""
+        """Whether a pending target will end the halt."""
         return self.state in (HaltState.LEAVING, HaltState.LIFTED)
 
     @property
     def rests(self) -> bool:
-        """Whether the drive is halted, and no target is on its way that will end it."""
+        """Whether the drive is halted and no pending target will end the halt."""
         return self.state in (HaltState.HELD, HaltState.UNANSWERED)
 
     def hold(self) -> None:
-        """Halt; whatever would have ended an earlier halt does not end this one."""
+        """Halt; a target that would have ended an earlier halt does not end this one."""
         self._enter(HaltState.HELD)
 
     def release(self) -> None:
-        """End it at once: there is nothing old that could go on."""
+        """End the halt at once, as no earlier motion can resume."""
         self._enter(HaltState.ENDED)
 
     def leave(self, now: float, delivery: Promise[None]) -> None:
-        """End it when the drive has taken the target that was commanded at ``now`` in [s].
+        """End the halt when the drive has taken the target commanded at ``now`` in [s].
 
         Where the drive refuses its delivery, the halt goes on.
         """
@@ -98,17 +97,17 @@ class Halt:
             self._leaving_since, self._delivery = now, delivery
 
     def end_in(self, mode: OperationMode) -> None:
-        """End it when the drive shows another mode, in which it has no target yet."""
+        """End the halt when the drive shows another mode, in which it has no target yet."""
         if self.held:
             self._ends_in = mode
 
     def bits(self, mode: Mode) -> int:
-        """Return bit 8 for a drive that is moved, or was moved last, by a mode."""
+        """Return bit 8 while halted, for the mode that moves or last moved the drive."""
         sets = self.held and self.state is not HaltState.LIFTED and mode.halts_by_bit
         return HALT_BIT if sets else NO_BITS
 
     def advance(self, now: float, period: float, mode: Mode) -> bool:
-        """End it where that is due, for a drive that acts on a mode.
+        """End the halt if due, for a drive that is active in a mode.
 
         Returns:
             False when the drive has not taken its new target in time, and stays halted.
@@ -131,7 +130,7 @@ class Halt:
         return True
 
     def _advance_offer(self, now: float, period: float, mode: ProfilePosition) -> bool:
-        """Offer a set-point under halt, then without; False when neither is acknowledged."""
+        """Offer a set-point under halt, then without; return False if neither is acknowledged."""
         if self._offered_since is None:
             if mode.offered:
                 self._offered_since = now
@@ -171,18 +170,18 @@ SLOWING_RATIO = 0.04  # of the time of a ramp, in which more than that has to be
 
 
 class BrakingWatch:
-    """Judges whether a stop that was commanded slows an axis down, by its positions."""
+    """Judges from the positions of an axis whether a commanded stop slows it down."""
 
     def __init__(self) -> None:
         self._least = math.inf
         self._since = 0.0
 
     def clear(self) -> None:
-        """Judge from the next speed on."""
+        """Restart with the next speed."""
         self._least = math.inf
 
     def fails(self, now: float, view: AxisState, deceleration: float) -> bool:
-        """Return whether the axis was seen for too long not to slow down.
+        """Return whether the axis has failed to slow down for too long.
 
         The ``deceleration`` of the stop is in user units per second squared.
         """
@@ -196,7 +195,7 @@ class BrakingWatch:
 
 
 class StopSequence:
-    """Stops a drive and takes its power away; every step has a deadline.
+    """Stops a drive and removes its power; every step has a deadline.
 
     A drive that does not react to its RPDO, or gets none because its device is not operational,
     is commanded by SDO; then no RPDO carries its controlword any more, which might enable it
@@ -228,26 +227,26 @@ class StopSequence:
 
     @property
     def running(self) -> bool:
-        """Whether it has begun and not ended."""
+        """Whether the sequence is running."""
         return self.goal is not None
 
     @property
     def disabled(self) -> bool:
-        """Whether the drive was seen to be without power."""
+        """Whether feedback confirms that the drive has no power."""
         return self._view.seen and self._view.shown_state in DISABLED
 
     @property
     def rests(self) -> bool:
-        """Whether the drive was seen to stand, and no target moves it any more."""
+        """Whether feedback confirms that the drive stands, and no target moves it any more."""
         return self._view.stands and self._view.shown_state not in MAY_MOVE
 
     def ramp_time(self) -> float:
-        """Return how long it brakes in [s], by the slower of its ramps."""
+        """Return the braking time in [s] by the slower ramp."""
         return min(RAMP_MAX, self._view.speed / self._deceleration)
 
     @property
     def _elapsed(self) -> float:
-        """Time since the present step began in [s]."""
+        """Time since the current step began in [s]."""
         return self._scheduler.now - self._began
 
     @property
@@ -256,10 +255,10 @@ class StopSequence:
         return min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
 
     def begin(self, *, quiet: bool = False, disables: bool = True) -> None:
-        """Begin, unless it runs already; what kept the RPDO from the drive before may be over.
+        """Begin unless already running; try the RPDO first again, as it may work now.
 
         Args:
-            quiet: Do not report what goes wrong: it is tried again and again.
+            quiet: Do not report failures, as the sequence is retried repeatedly.
             disables: Disable a drive that a quick stop holds at rest; one that runs does so, too.
         """
         if self.running:
@@ -271,36 +270,36 @@ class StopSequence:
         self._task = self._scheduler.background(self._run())
 
     async def run(self, *, disables: bool = True) -> None:
-        """Begin if need be, and wait for the end."""
+        """Begin the sequence if necessary, and wait for its end."""
         if self._quiet:
             self.abandon('begun anew')  # what has failed in it may work now
         self.begin(disables=disables)
         await self.ended()
 
     async def confirmed(self) -> bool:
-        """Return whether the drive is seen to stand without power now."""
+        """Return whether feedback confirms now that the drive stands without power."""
         with self._view.looking():
             return await self._within(UNSEEN_TIMEOUT, lambda: self.disabled and self.rests)
 
     async def seen_at_rest(self) -> bool:
-        """Return whether the drive is seen to stand now; what TPDOs do not show is read by SDO."""
+        """Return whether the drive stands now, by TPDOs or else by reading its state by SDO."""
         view = self._view
         with view.looking():
             await self._within(UNSEEN_TIMEOUT, lambda: view.speed_known)
         return view.stands
 
     async def ended(self) -> None:
-        """Wait until it does not run."""
+        """Wait until the sequence has ended."""
         await self._within(SHUTDOWN_MAX + REACTION_TIME, lambda: not self.running)
 
     def abandon(self, reason: str) -> None:
-        """End it where it is."""
+        """Cancel the sequence."""
         if self._task is not None:
             self._task.cancel(SdoError(reason))
         self.goal = None
 
     def use_sdo(self) -> None:
-        """Command the drive by SDO from now on, because its RPDO does not reach it."""
+        """Command the drive by SDO from now on, as its RPDO has no effect."""
         if self._controlword.keeps_back:
             return
         self._controlword.keep_back()
@@ -308,7 +307,7 @@ class StopSequence:
             self._write()
 
     async def _run(self) -> None:
-        """Lead through the steps; what holds already ends a step at once."""
+        """Run the steps; skip those whose goal is already reached."""
         view = self._view
         self._sdo_error = ''
         self._note_sight()
@@ -337,7 +336,7 @@ class StopSequence:
             self.goal = None
 
     async def _lead(self, goal: DriveState, done: Callable[[], bool], timeout: float) -> None:
-        """Command a state, again and again by SDO where the drive does not react to its RPDO."""
+        """Command a state; repeat by SDO if the drive does not react to its RPDO."""
         self.goal = goal
         view, self._began = self._view, self._scheduler.now
         end = self._began + timeout
@@ -368,7 +367,7 @@ class StopSequence:
         self._unseen_after = self._scheduler.now + UNSEEN_TIMEOUT + self.ramp_time()
 
     def _gives_up(self) -> bool:
-        """Return whether the step has failed: the drive does not slow down, or shows nothing."""
+        """Return whether the step has failed: no deceleration, or no feedback."""
         view, now = self._view, self._scheduler.now
         if not view.seen:
             return now > self._unseen_after
@@ -379,7 +378,7 @@ class StopSequence:
         return self._braking.fails(now, view, self._deceleration)
 
     def _report_motion(self) -> None:
-        """Report that it is not seen to rest: it moves, or shows nothing any more."""
+        """Report that rest is not confirmed: the drive moves, or sends no feedback."""
         view = self._view
         if view.seen:
             self._report('did not come to rest in time')
@@ -400,7 +399,7 @@ class StopSequence:
             self._send_report(Severity.ERROR, f'{what}: {shown}{remedy}')
 
     def _write(self) -> None:
-        """Write the controlword of this step; the step does not wait for the answer."""
+        """Write the controlword of this step without waiting for the answer."""
         quick_stop = self.goal is DriveState.QUICK_STOP_ACTIVE
         command = Command.QUICK_STOP if quick_stop else Command.DISABLE_VOLTAGE
         # a drive without quick stop stays halted
@@ -416,7 +415,7 @@ class StopSequence:
                 self._controlword.send_again()
 
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:
-        """Return whether a condition holds in time, for a drive whose cycle may fail."""
+        """Return whether a condition holds in time, even if the cycle of the drive fails."""
         view = self._view
 
         def holds() -> bool:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""User units (rad, rad/s, effort) against device units, by the factors of bus.yml or of the drive.
+"""Conversion between user units (rad, rad/s, effort) and device units of a drive.
 
-A value that its object cannot hold is refused by :meth:`Scale.to_device`.
+Factors come from bus.yml or the drive. :meth:`Scale.to_device` refuses values out of range.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ INT32_MAX = 2**31 - 1
 
 
 def clamp(value: float, largest: int) -> int:
-    """Return the nearest integer that a signed object holds, by its INT16_MAX or INT32_MAX."""
+    """Round to an integer and clamp to a signed object (INT16_MAX or INT32_MAX)."""
     return max(-largest - 1, min(largest, round(value)))
 
 
@@ -32,7 +32,7 @@ class Scale:
     __slots__ = ('_from_dev', '_limits', '_offset_from_dev', '_offset_to_dev', 'to_dev')
 
     def __init__(self, largest: int = INT32_MAX) -> None:
-        """``largest`` is what objects of the quantity hold, INT16_MAX or INT32_MAX."""
+        """``largest`` is the maximum of the objects of this quantity, INT16_MAX or INT32_MAX."""
         self._limits = (-largest - 1, largest)
         self.set(1.0, 1.0)
 
@@ -43,19 +43,19 @@ class Scale:
         offset_to_dev: float = 0.0,
         offset_from_dev: float = 0.0,
     ) -> None:
-        """Use other factors."""
+        """Set factors and offsets."""
         self.to_dev, self._from_dev = to_dev, from_dev
         self._offset_to_dev, self._offset_from_dev = offset_to_dev, offset_from_dev
 
     def raw(self, value: float) -> float:
-        """Convert to device units, whether or not an object can hold it."""
+        """Convert to device units without a range check."""
         return value * self.to_dev + self._offset_to_dev
 
     def to_device(self, value: float, limits: tuple[float, float] | None = None) -> int:
-        """Convert to the nearest device unit, within the limits of an object if they are given.
+        """Convert to the nearest integer device unit; refuse values beyond ``limits``, if given.
 
         Raises:
-            DriveError: It is not a number, or its object cannot hold it.
+            DriveError: The value is not a number, or does not fit its object.
         """
         scaled = value * self.to_dev + self._offset_to_dev
         if not math.isfinite(scaled):
@@ -71,7 +71,7 @@ class Scale:
         return rounded
 
     def commanded(self, value_dev: float) -> float:
-        """Return the target that :meth:`to_device` turns into these device units."""
+        """Return the target in user units for device units; inverse of :meth:`to_device`."""
         return (value_dev - self._offset_to_dev) / self.to_dev
 
     def from_device(self, value_dev: float) -> float:
@@ -80,18 +80,18 @@ class Scale:
 
 
 class Units:
-    """The scales of one axis, by the quantity."""
+    """The scales of one axis, one for each quantity."""
 
     def __init__(self, config: DriveConfig) -> None:
         self.position = Scale()
-        self.distance = Scale()  # of positions, without their offsets
+        self.distance = Scale()  # scale of positions without offsets
         self.velocity = Scale()
         self.acceleration = Scale()
         self.effort = Scale(INT16_MAX)
         self.use(config)
 
     def use(self, config: DriveConfig) -> None:
-        """Use the factors of bus.yml, or those of the drive itself."""
+        """Set the factors from bus.yml or the drive."""
         self.config = config
         scales = config.scale_pos_to_dev, config.scale_pos_from_dev
         self.position.set(*scales, config.offset_pos_to_dev, config.offset_pos_from_dev)

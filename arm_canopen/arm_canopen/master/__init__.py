@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The network: boot-up, NMT, SDO queues, SYNC cycle, process image.
 
-Times are on the steady clock in [s]. The names here are for those who talk to devices without a
-network around them.
+Times are on the steady clock in [s]. The names exported here serve programs that talk to devices
+without running a network.
 """
 
 from .other_master import MasterFrames

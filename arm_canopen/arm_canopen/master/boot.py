@@ -29,9 +29,9 @@ RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
 
 
 class BootFault(Enum):
-    """A reason why a boot failed, by its letter in CiA 302-2.
+    """Reason why a boot failed, with its letter in CiA 302-2.
 
-    Where the identity differs it has the name of the attribute of Identity.
+    Identity faults are named like the attributes of Identity.
     """
 
     NO_ANSWER = 'B', 'no answer to the read of 0x1000'
@@ -46,16 +46,16 @@ class BootFault(Enum):
     SERIAL_NUMBER = 'O', 'serial number 0x1018:04 differs'
 
     def __str__(self) -> str:
-        """Return the letter with where it is from, as manuals of masters list it."""
+        """Return the letter with its source, as manuals of masters list it."""
         letter, text = self.value
         return f'CiA 302-2 boot error {letter}: {text}'
 
 
 class BootProcess:
-    """Brings one device to operational, again and again until it is.
+    """Boots one device, with retries until it is operational.
 
-    A device is noticed by its boot-up message or by its answer to a read of 0x1000, whatever comes
-    first, so one that missed the reset is found too.
+    It detects the device by its boot-up message or its answer to a read of 0x1000, whichever comes
+    first, so it also finds a device that missed the reset.
     """
 
     def __init__(
@@ -83,15 +83,15 @@ class BootProcess:
         line = bus.place_of(node.name, 'reset_communication').line
         self._written = f' ({bus.file}:{line})' if line else ''
         self._reported = ''
-        self._failure = ''  # of the attempt before, in words
+        self._failure = ''  # failure of the previous attempt, in words
         self._fault: BootFault | None = BootFault.CONFIGURATION
         self._restored = False
 
     async def run(self, *, announced: bool, pause: float = 0.0, was_reset: bool = False) -> None:
         """Boot the device after ``pause`` in [s]; return when it is operational.
 
-        One that has ``announced`` itself by its boot-up message need not be looked for; one that
-        ``was_reset`` is not asked before it could have done so, as the question would be lost.
+        A device that has ``announced`` itself by its boot-up message is not searched for. One that
+        ``was_reset`` gets no request before its boot-up time, as that would be lost.
         """
         self._startup.forget(self._node)
         self._failure = ''
@@ -131,7 +131,7 @@ class BootProcess:
             )
 
     async def _answers(self) -> bool:
-        """Read 0x1000; any answer will do."""
+        """Read 0x1000; return whether the device answers at all."""
         try:
             with suppress(SdoAbortError):
                 await self._node.sdo.read(Index.DEVICE_TYPE, 0, self._node.config.boot_timeout)
@@ -172,7 +172,7 @@ class BootProcess:
         )
 
     async def _command(self, command: NmtCommand) -> None:
-        """Send an NMT command and wait until it has left; a boot that ends before withdraws it."""
+        """Send an NMT command and wait until it is sent; withdraw it if the boot ends before."""
         sent = self._send_nmt(command, self._node.config.node_id)
         try:
             await sent
@@ -180,14 +180,14 @@ class BootProcess:
             sent.abandon()
 
     async def _restore(self, subindex: int) -> None:
-        """Restore the defaults, which are valid after a reset (CiA 301, 7.5.2.14)."""
+        """Restore default parameters, which take effect after a reset (CiA 301, 7.5.2.14)."""
         node = self._node
         await self._configurator.write(
             SdoWrite(Index.RESTORE_PARAMETERS, subindex, RESTORE_SIGNATURE)
         )
         self._restored = True
         await self._command(NmtCommand.RESET_NODE)
-        # the boot-up message ends this boot and begins the next
+        # the boot-up message ends this boot and starts the next one
         await self._scheduler.timer(node.config.boot_timeout)
         raise BootError(
             f'{node.name} (node {node.config.node_id}) sent no boot-up message within '
@@ -195,7 +195,7 @@ class BootProcess:
         )
 
     async def _runs(self) -> bool:
-        """Find out whether a device that shall be kept alive is in operation."""
+        """Return whether a device with the keep-alive bit is already operational."""
         node = self._node
         self._fault = BootFault.NO_HEARTBEAT
         self._enter(BootPhase.STATE)
@@ -213,7 +213,7 @@ class BootProcess:
         return node.nmt_state is NmtState.OPERATIONAL
 
     async def _take_over(self) -> None:
-        """Go on with a device as it runs, without a frame that could disturb it."""
+        """Take over a running device without sending a frame that could disturb it."""
         node = self._node
         self._enter(BootPhase.IDENTITY)
         await self._check_identity(node.config.identity)
@@ -240,17 +240,17 @@ class BootProcess:
         self._node.report(EventKind.BOOT, Severity.INFO, text)
 
     async def _check_alone(self) -> None:
-        """Refuse a node id that several devices have: each would do what one is commanded.
+        """Refuse a node id shared by several devices: each would execute the commands for one.
 
         A frame that the bus brings twice is no second device, so one doubled answer is confirmed
         by another.
         """
         counters, node_id = self._node.sdo.counters, self._node.config.node_id
-        self._fault = None  # CiA 302-2 has no letter for it
+        self._fault = None  # CiA 302-2 defines no letter for it
         for index in (Index.ERROR_REGISTER, Index.DEVICE_TYPE):
             with suppress(SdoAbortError):
                 await self._configurator.read_number(index, 0)
-            doubled = counters.doubled  # a server answers in order, so what is late came before
+            doubled = counters.doubled  # a server answers in order, so late answers precede
             await self._scheduler.timer(SECOND_ANSWER_TIME)
             if counters.doubled == doubled:
                 return
@@ -275,7 +275,7 @@ class BootProcess:
                 )
 
     async def _await_answer_to_guarding(self) -> None:
-        """Request the state before anything is written, which could not be watched without it."""
+        """Wait for an answer to node guarding before the first write, else raise."""
         node = self._node
         self._fault = BootFault.NO_GUARDING
         self._enter(BootPhase.ERROR_CONTROL)
@@ -317,14 +317,14 @@ class BootProcess:
         self._report_once(f'boot failed while {step}: {reason}{fault}')
 
     def _report_once(self, text: str) -> None:
-        """Report a reason when it is new; further attempts that end alike are not reported."""
+        """Report a failure unless the previous attempt failed for the same reason."""
         if text != self._reported:
             self._reported = text
             self._node.report(EventKind.BOOT_FAILED, Severity.WARNING, text)
 
 
 class BootManager:
-    """Begins the boot of a device when it appears, restarts or drops out."""
+    """Starts the boot of a device when it appears, restarts or is lost."""
 
     def __init__(
         self,
@@ -336,7 +336,7 @@ class BootManager:
         send: Send,
         send_nmt: SendNmt,
     ) -> None:
-        """Listen to the devices; nothing is booted before :meth:`start`."""
+        """Subscribe to device events; no boot begins before :meth:`start`."""
         self._scheduler = scheduler
         self._tasks: dict[str, Task[None]] = {}
         self._processes: dict[str, BootProcess] = {}
@@ -360,7 +360,7 @@ class BootManager:
         pause: float = 0.0,
         was_reset: bool = False,
     ) -> None:
-        """Boot a device, as of :meth:`BootProcess.run`; anew if a boot is on its way."""
+        """Boot a device, see :meth:`BootProcess.run`; restart a boot that is in progress."""
         self._end(node)
         process = self._processes[node.name]
         boot = process.run(announced=announced, pause=pause, was_reset=was_reset)
@@ -385,7 +385,7 @@ CommandNmt: TypeAlias = Callable[[NmtCommand, int], Coroutine[Promise[Any], None
 
 
 class Startup:
-    """Holds configured devices back until all mandatory ones are configured.
+    """Delays the start of configured devices until all mandatory ones are configured.
 
     Without a mandatory device each one is started as soon as it is ready.
     """
@@ -414,7 +414,7 @@ class Startup:
                 node.on_gone = partial(self._lost, node)
 
     async def watch(self) -> None:
-        """Report mandatory devices that are not there within `boot_time`."""
+        """Report mandatory devices that are missing after ``boot_time``."""
         if self._config.boot_time <= 0.0 or self.complete:
             return
         await self._scheduler.timer(self._config.boot_time)
@@ -427,14 +427,14 @@ class Startup:
             )
 
     def missing_text(self) -> str:
-        """Name the mandatory devices that are waited for."""
+        """Return a text that names the missing mandatory devices."""
         return ', '.join(node.name for node in self._missing())
 
     async def admit(self, node: RemoteNode) -> bool:
         """Wait until a configured device may be started.
 
         Returns:
-            True when it has been started together with the others, by one frame.
+            True if one NMT frame has started it together with the others.
         """
         if self.complete:
             return False
@@ -445,7 +445,7 @@ class Startup:
         return await promise
 
     def forget(self, node: RemoteNode) -> None:
-        """The boot of a device begins anew, so it waits for nothing any more."""
+        """Remove a device from those waiting, because its boot restarts."""
         self._waiting.pop(node, None)
 
     def _missing(self) -> list[RemoteNode]:
@@ -457,7 +457,7 @@ class Startup:
 
     def _release(self) -> None:
         self.complete = True
-        # one frame starts who is there: a device that is still being configured must not get it
+        # one frame starts all present devices; those still being configured must not receive it
         together = self._config.start_all_nodes and len(self._waiting) == len(self._nodes)
         waiting, self._waiting = self._waiting, {}
 
@@ -487,7 +487,7 @@ class Startup:
             self._report_error(f'{node.name} is mandatory and lost; the others go on without it')
 
     async def _command(self, command: NmtCommand) -> None:
-        """Bring the axes to rest, and send a command to all devices."""
+        """Bring the axes to rest, then send an NMT command to all devices."""
         try:
             await self._command_nmt(command, ALL_NODES)
         except BusError as error:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the boot plan to a device, or compares the two; and reads what its RPDOs begin with."""
+"""Writes the boot plan to a device or compares both; reads the initial values of its RPDOs."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Configurator:
         self._on_write = on_write
 
     async def apply(self) -> None:
-        """Write everything; the device must not process PDOs meanwhile.
+        """Write the whole boot plan; the device must not process PDOs meanwhile.
 
         Raises:
             SdoError: The device refused something that bus.yml requests, or does not answer.
@@ -81,13 +81,13 @@ class Configurator:
                 )
 
     async def write_error_control(self) -> None:
-        """Configure error control, TPDOs, and that the device watches the master."""
+        """Configure error control, TPDOs, and the supervision of the master by the device."""
         for write in await self._writes():
             if write.index in ERROR_CONTROL or write.key == WATCH_KEY or write.is_own_timer:
                 await self._bring(write)
 
     async def differences(self) -> list[str]:
-        """Compare the PDOs of a device that runs with those of bus.yml; in words.
+        """Compare the PDOs of a running device with bus.yml; return the differences in words.
 
         Raises:
             SdoError: The device does not answer.
@@ -101,7 +101,7 @@ class Configurator:
             except SdoAbortError:
                 if not write.fixed:
                     raise
-                continue  # the device does not show it
+                continue  # the device does not let it be read
             if not write.fits(present):
                 found.append(f'{write.place} is {write.text(present)} instead of {write.text()}')
         return found
@@ -137,7 +137,7 @@ class Configurator:
         return int.from_bytes(data, 'little')
 
     async def _bring(self, write: BootWrite) -> None:
-        """Write an object, unless the device has what is wanted, or cannot take it."""
+        """Write an object unless the device already holds the value or does not support it."""
         data = write.data
         if write.mask is not None:  # a COB-ID, of which the device keeps some bits
             present = await self.read_number(*write.address)
@@ -157,7 +157,7 @@ class Configurator:
             self._node.watch_slot = write.subindex if any(data) else 0
 
     def _refused(self, write: BootWrite, error: SdoAbortError) -> None:
-        """Go on without what bus.yml does not request; raise an SdoError for what it does."""
+        """Handle a refused write: raise an SdoError if bus.yml requests it, else continue."""
         if write.key == WATCH_KEY:
             reason = f'{error}: it does not take {write.text()}, {UNWATCHED}'
             if write.requested and any(write.data):
@@ -172,20 +172,20 @@ class Configurator:
             self._rely_on_timer(write.index, taken=False)
 
     def _rely_on_timer(self, index: int, *, taken: bool) -> None:
-        """Await a TPDO by its event timer, or no more, until the next boot."""
+        """Set whether a TPDO is expected at the period of its event timer, until the next boot."""
         for entry in self._node.image.tpdos:
             if entry.config.number == index - Index.TPDO_COMMUNICATION + 1:
                 entry.rely_on_timer(taken=taken)
 
     async def _holds(self, write: BootWrite) -> bool:
-        """Return whether a device that refused to be written has the value already."""
+        """Return whether a device that refused a write already holds the value."""
         try:
             return write.fits(await self._node.sdo.read(*write.address, self._sdo_timeout))
         except SdoAbortError:
             return False
 
     async def _writes(self) -> list[BootWrite]:
-        """Return the plan; the device watches the master unless it watches another node."""
+        """Return the boot plan, adapted to the entries of 0x1016 in the device."""
         node = self._node
         node.watch_slot = 0
         writes = boot_writes(self._bus, node.config, await self._consumers())
@@ -194,7 +194,7 @@ class Configurator:
         return writes
 
     async def _consumers(self) -> dict[int, int | None]:
-        """Return what the device has in 0x1016, up to the first entry that is free."""
+        """Read the entries of 0x1016, up to the first one that is free."""
         held: dict[int, int | None] = {}
         while (subindex := consumer_to_read(self._bus, self._node.config, held)) is not None:
             held[subindex] = None
@@ -214,10 +214,10 @@ POSITION_TARGETS = {
 
 
 async def preset_outputs(node: RemoteNode) -> None:
-    """Set each RPDO of a device in operation to what the mapped objects hold now.
+    """Set each RPDO of an operational device to the present values of its mapped objects.
 
     Raises:
-        BootError: A mapped object cannot be read, so that the RPDO would bring something new.
+        BootError: A mapped object cannot be read, so the RPDO might change its value.
     """
     for output, position, mapped in _mapped(node):
         try:
@@ -231,11 +231,11 @@ async def preset_outputs(node: RemoteNode) -> None:
 
 
 async def read_outputs(node: RemoteNode, timeout: float) -> None:
-    """Set each RPDO of a configured device to what the device holds.
+    """Set each RPDO of a configured device to the values in the device.
 
-    What its driver commands is left to the driver, except for the mode of operation, as the drive
-    may be one that must not be sent mode 0, and for the position targets: they are where the drive
-    is, before any TPDO shows it. What cannot be read is taken from bus.yml or the EDS.
+    Objects that the driver commands are left to it, except the mode of operation (some drives must
+    not get mode 0) and position targets, which start at the actual position before any TPDO shows
+    it. Unreadable values come from bus.yml or the EDS.
 
     Raises:
         SdoError: The device does not answer.
@@ -255,7 +255,7 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
 
 
 def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:
-    """Return the object with the first value of an RPDO; None where the driver has it."""
+    """Return the object that holds the initial value; None if the driver sets it."""
     index = mapped.index
     first_axis, axis = axis_of(index)
     if node.config.is_drive and (first_axis, mapped.subindex) in POSITION_TARGETS:

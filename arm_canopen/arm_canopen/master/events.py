@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 
 class Severity(IntEnum):
-    """How much an event matters; the order counts."""
+    """Severity of an event, in ascending order."""
 
     INFO = 0
     WARNING = 1
@@ -19,7 +19,7 @@ class Severity(IntEnum):
 
 
 class EventKind(Enum):
-    """What happened."""
+    """Kind of an event."""
 
     NMT_STATE = 'nmt state'
     BOOT = 'boot'
@@ -36,15 +36,15 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened on the network."""
+    """An event on the network."""
 
-    kind: EventKind  # what happened
-    severity: Severity  # how much it matters
+    kind: EventKind  # kind of event
+    severity: Severity  # severity
     node: str  # name of the device, empty when it concerns the bus
-    text: str  # the event in words
+    text: str  # description
 
     def __str__(self) -> str:
-        """Write it as a log line."""
+        """Format the event as a log line."""
         return f'{self.node}: {self.text}' if self.node else self.text
 
 

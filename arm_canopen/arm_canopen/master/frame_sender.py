@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How frames of the master leave, and the state of the CAN controller that sends them."""
+"""Sending of the master's frames, and the state of its CAN controller."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ SendNmt: TypeAlias = Callable[[NmtCommand, int], Promise[None]]
 """Sends a command to a node id, or to all with 0; the promise is resolved when it has left,
 rejected with a BusError when the bus has not taken it."""
 REPEAT_AFTER = 0.01  # [s] before a command that the bus refused is sent again
-REFUSAL_TIMEOUT = 0.5  # [s] in which the bus has to take a command; it would come too late then
+REFUSAL_TIMEOUT = 0.5  # [s] until a command that the bus refuses is given up
 
 
 class BusSender:
-    """Sends frames; a bus that refuses them is reported once, until it works again."""
+    """Sends frames; reports a bus that refuses them once, until it works again."""
 
     def __init__(self, send: Callable[[Frame], None], report: Report) -> None:
         """``send`` may raise BusError."""
@@ -41,7 +41,7 @@ class BusSender:
         self._failed = False
 
     def send(self, frame: Frame) -> BusError | None:
-        """Send a frame; return why the bus has not taken it."""
+        """Send a frame; return the error if the bus refuses it, else None."""
         try:
             self._send(frame)
         except BusError as error:
@@ -56,13 +56,13 @@ class BusSender:
 
 
 class PeriodicFrame:
-    """A frame that is sent periodically; after a pause the series begins anew.
+    """A frame that is sent periodically; after a pause the schedule restarts.
 
-    So nothing is made up for, and nothing crowds.
+    Missed frames are not sent later, so no bursts occur.
     """
 
     def __init__(self, can_id: int, period: float, data: Callable[[], bytes], send: Send) -> None:
-        """Send ``data`` with an identifier every ``period`` in [s]; 0 for never."""
+        """Send ``data()`` with an identifier every ``period`` in [s]; 0 disables it."""
         self._can_id = can_id
         self._period = period
         self._data = data
@@ -70,7 +70,7 @@ class PeriodicFrame:
         self._next = 0.0
 
     def advance(self, now: float) -> None:
-        """Send it when it is due."""
+        """Send the frame if it is due."""
         if self._period <= 0.0 or now < self._next:
             return
         due = self._next + self._period
@@ -79,10 +79,10 @@ class PeriodicFrame:
 
 
 class NmtSender:
-    """Sends NMT commands; with an inhibit time (0x102A) those that come too early wait in order.
+    """Sends NMT commands in order, at least the inhibit time (0x102A) apart.
 
-    A command counts as sent when the bus has taken its frame. One whose promise was abandoned
-    meanwhile does not leave any more.
+    A command counts as sent when the bus has accepted its frame. A command whose promise is
+    abandoned before is not sent.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class NmtSender:
     ) -> None:
         """``inhibit_time`` is the shortest time between two commands in [s], 0 for none.
 
-        ``on_sent`` gets each command and its node id when it leaves.
+        ``on_sent`` is called with each command and its node id when it is sent.
         """
         self._scheduler = scheduler
         self._send = send
@@ -104,7 +104,7 @@ class NmtSender:
         self._busy = False
 
     def send(self, command: NmtCommand, node_id: int) -> Promise[None]:
-        """Send a command to one device, or to all with id 0; done when it has left."""
+        """Queue a command to one device, or to all with id 0; done when it is sent."""
         sent: Promise[None] = Promise()
         self._waiting.append((command, node_id, sent))
         if not self._busy:
@@ -158,14 +158,14 @@ _REPORTS: dict[ControllerState, tuple[Severity, str]] = {
 
 
 class ControllerWatch:
-    """Follows the error state of the controller, and reports changes."""
+    """Tracks the error state of the CAN controller and reports changes."""
 
     def __init__(self, report: Report) -> None:
-        self.state = ControllerState.ACTIVE  # its state, error active until a frame shows another
-        self.transmit_errors = 0  # its transmit error counter, as far as it reports it
-        self.receive_errors = 0  # its receive error counter
+        self.state = ControllerState.ACTIVE  # error active until a frame shows another state
+        self.transmit_errors = 0  # transmit error counter, if the controller reports it
+        self.receive_errors = 0  # receive error counter, likewise
         self.error_frames = 0  # number of error frames
-        self.last_error = ''  # the last one in words, empty before the first
+        self.last_error = ''  # last error in words, empty before the first
         self._report = report
         self._alone = False
 
@@ -188,7 +188,7 @@ class ControllerWatch:
             self._log(severity, f'CAN controller {state.value} ({self.last_error}): {text}')
 
     def receive_data(self) -> None:
-        """End bus off: data has come, after a restart that no error frame has shown."""
+        """Clear bus-off when data arrives: the controller restarted without an error frame."""
         self.state, self._alone = ControllerState.ACTIVE, False
         self._log(Severity.INFO, 'CAN controller receives frames again after bus off')
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What shows that a device is alive and well: heartbeat or node guarding, EMCYs, its TPDOs."""
+"""Supervision of a device: heartbeat or node guarding, EMCY messages, and its TPDOs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .events import EventKind, Severity
 from .frame_sender import Send
 from .process_image import ReceivedTpdo
 
-TOGGLE = 0x80  # bit of an answer that changes with each
+TOGGLE = 0x80  # toggle bit of a node guarding response
 
 
 def guarding_request(node_id: int) -> Frame:
@@ -26,15 +26,15 @@ def guarding_request(node_id: int) -> Frame:
 
 
 class LifeSigns:
-    """The error control of one device."""
+    """Error control (heartbeat or node guarding) of one device."""
 
     def __init__(self, config: NodeConfig, send: Send) -> None:
-        """Nothing is supervised before :meth:`start`."""
-        self.last = 0.0  # steady time of the last heartbeat, or of the last answer, in [s]
-        # it was started and has never shown one, though it is supervised; it has to show one
-        # before it is started again
+        """Supervision begins with :meth:`start`."""
+        self.last = 0.0  # steady time of the last heartbeat or guarding response in [s]
+        # the supervised device was started but never sent a life sign; it has to send one before
+        # it is started again
         self.silent = False
-        self.missed = 0  # how often in a row one was missing when it was due
+        self.missed = 0  # number of consecutive missed life signs
         self._config = config
         self._send = send
         self._since = self._awaited_from = 0.0
@@ -52,7 +52,7 @@ class LifeSigns:
         return config.heartbeat_timeout or config.guard_time * config.retry_factor
 
     def start(self, now: float) -> None:
-        """Supervise from a time in [s] on, from which the first sign is awaited."""
+        """Start supervision at a time in [s]; the first life sign is due from then on."""
         self.last = self._since = now
         self.silent = False
         self.missed = 0
@@ -60,15 +60,15 @@ class LifeSigns:
         self._await_next(now)
 
     def stop(self) -> None:
-        """Supervise no more."""
+        """Stop supervision."""
         self.missed = 0
         self._timeout = math.inf
         self._due = None
 
     def take(self, state: NmtState, frame: Frame, *, supervised: bool) -> bool:
-        """Process a life sign; return whether it is new, by the toggle bit of node guarding.
+        """Process a life sign; return whether its toggle bit (node guarding) is valid.
 
-        The toggle bit counts for a supervised device only, which is online.
+        The toggle bit is checked only if the device is ``supervised``, that is online.
         """
         if supervised and self._config.uses_node_guarding and state is not NmtState.BOOT_UP:
             toggle = frame.data[0] & TOGGLE
@@ -80,9 +80,9 @@ class LifeSigns:
         return True
 
     def overdue(self, now: float) -> str:
-        """Return in words what is missing at a time in [s], empty while nothing is.
+        """Return which life sign is overdue at a time in [s], in words; empty if none.
 
-        What is missing is awaited again from then on. A guarding request that is due is sent.
+        The time-out of an overdue sign starts again. A guarding request that is due is sent.
         """
         config = self._config
         if now - max(self.last, self._awaited_from) > self._timeout:
@@ -113,24 +113,24 @@ class LifeSigns:
             self._due, self._unanswered, self._toggle = now, 0, None
 
 
-HISTORY = 16  # EMCYs that are remembered
-REPEAT_PERIOD = 10.0  # [s] in which one that comes again is counted, and not reported
-REPORTS_MAX = 8  # that are reported in that time, whatever they are
-NAMED_MAX = 3  # codes that a count names
+HISTORY = 16  # number of EMCYs kept
+REPEAT_PERIOD = 10.0  # [s] in which repeated EMCYs are only counted
+REPORTS_MAX = 8  # EMCYs of any kind reported in that time
+NAMED_MAX = 3  # codes named in a summary
 
 
 class EmergencyLog:
-    """Reports each EMCY in words, and remembers the last ones.
+    """Reports each EMCY in words, and keeps the last ones.
 
-    One that comes again and again, or many that alternate, are a flood: it is reported once in
-    :data:`REPEAT_PERIOD`, with the number of its messages, until none has come for that long.
+    Repeated or alternating EMCYs count as a flood. It is reported once in :data:`REPEAT_PERIOD`,
+    with the number of messages, until none arrives for that long.
     """
 
     def __init__(self, report: Callable[[EventKind, Severity, str], None]) -> None:
-        # the last EMCYs, the newest at the end, with the steady time of each in [s]; of a flood
-        # each one once
+        # the last EMCYs, newest last, with the steady time of each in [s]; each EMCY of a flood is
+        # stored once
         self.history: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
-        # last one that was no reset, None when the device reported that all have ended
+        # last EMCY that is not an error reset; None after the device reported no errors
         self.last: Emergency | None = None
         self._report = report
         self._came: dict[str, float] = {}
@@ -141,13 +141,13 @@ class EmergencyLog:
         self._counted_at = -REPEAT_PERIOD
 
     def since(self, begin: float) -> Emergency | None:
-        """Return the last EMCY, when it came after a steady time in [s] and was no reset."""
+        """Return the last EMCY if it arrived after a steady time in [s] and is no reset."""
         if self.last is None or self.history[-1][0] < begin or self.history[-1][1].is_reset:
             return None
         return self.last
 
     def restarted(self) -> None:
-        """The device restarted: whatever it was, it ended with that."""
+        """Clear the current EMCY, because the device restarted."""
         self.last = None
         self._came.clear()
         self._newest = ''
@@ -167,14 +167,14 @@ class EmergencyLog:
         self.history.append((now, emergency))
         if not emergency.is_reset:
             self.last = emergency
-        else:  # the error register has those that remain
+        else:  # the error register shows remaining errors
             self.last = self.last or emergency if emergency.register else None
         severity = Severity.INFO if emergency.is_reset else Severity.ERROR
         code = error_code_text(emergency.code)
         self._report_or_count(severity, f'EMCY: {emergency}', code, now)
 
     def look(self, now: float) -> None:
-        """Report the number of those that were only counted, where that is due."""
+        """Report the number of EMCYs that were only counted, if due."""
         counted = now - self._counted_since
         if not self._repeats or counted < REPEAT_PERIOD:
             return
@@ -201,7 +201,7 @@ class EmergencyLog:
 
 
 class PdoWatch:
-    """Counts the TPDOs that do not come, and reports once when they have stopped."""
+    """Counts missed TPDOs, and reports once when TPDOs stop."""
 
     def __init__(
         self,
@@ -214,7 +214,7 @@ class PdoWatch:
         self._every_sync = [entry for entry in inputs if entry.every_sync]
         self._synchronous = {entry.config.number for entry in inputs if entry.synchronous}
         self._stopped: set[int] = set()
-        self._may_get_lost = ''  # numbers of TPDOs, as at the last boot
+        self._may_get_lost = ''  # TPDO numbers reported at the last boot
         for entry in inputs:
             entry.on_short = self._report_short
 
@@ -224,11 +224,11 @@ class PdoWatch:
         return max((entry.timestamp for entry in self._inputs), default=0.0)
 
     def stop(self) -> None:
-        """The device went away."""
+        """Stop the supervision, because the device is lost."""
         self._stopped.clear()
 
     def warn_of_losses(self) -> None:
-        """Report which TPDOs of a drive may get lost unnoticed, unless the last boot did."""
+        """Report TPDOs of a drive whose loss goes unnoticed, unless already reported."""
         numbers = ', '.join(
             str(entry.config.number) for entry in self._inputs if entry.loss_unnoticed
         )
@@ -241,22 +241,22 @@ class PdoWatch:
             )
 
     def expect(self) -> None:
-        """A SYNC is about to be sent: await those that answer each one."""
+        """Expect the TPDOs that answer each SYNC; call it before a SYNC is sent."""
         for entry in self._every_sync:
             entry.expect()
 
     def excuse(self, late: float) -> None:
-        """Await those that answer SYNC so many [s] longer, as it was not sent meanwhile."""
+        """Extend the deadline of synchronous TPDOs by ``late`` in [s], as SYNC was delayed."""
         for entry in self._inputs:
             if entry.synchronous:
                 entry.excused += late
 
     def count_missed(self) -> None:
-        """Count those that did not answer the last SYNC."""
+        """Count the TPDOs that did not answer the last SYNC."""
         self.missed += sum(entry.awaited for entry in self._every_sync)
 
     def look(self, now: float) -> None:
-        """Report those that have come and then stopped, at a steady time in [s]."""
+        """Report the TPDOs that have stopped, at a steady time in [s]."""
         stopped = [
             entry for entry in self._inputs if entry.values is not None and entry.stale(now)
         ]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""States of managed nodes, whose transitions may take seconds and many SYNC cycles.
+"""Lifecycle of managed nodes whose transitions take seconds and many SYNC cycles.
 
 States, transitions and their numbers are those of lifecycle_msgs (ROS 2 design, "Managed nodes").
 rclpy's own lifecycle node runs a transition inside a service callback, which would have to wait
@@ -40,7 +40,7 @@ class LifecycleState(IntEnum):
 
 
 class Verb(IntEnum):
-    """What a transition does; the number of its success is ten times that, of its failure + 1."""
+    """Kind of a transition; its id for success is 10 times the value, for failure 1 more."""
 
     CONFIGURE = 1
     CLEANUP = 2
@@ -59,11 +59,11 @@ class Transition:
     """A transition that a client may request."""
 
     number: int  # its id in lifecycle_msgs/Transition
-    verb: Verb  # what it does
-    start: LifecycleState  # the state in which it is possible
-    through: LifecycleState  # the state while it runs
-    success: LifecycleState  # the state after it
-    failure: LifecycleState  # the state when it fails
+    verb: Verb  # kind of transition
+    start: LifecycleState  # state before it
+    through: LifecycleState  # state while it runs
+    success: LifecycleState  # state after it
+    failure: LifecycleState  # state after a failure
 
 
 _S = LifecycleState
@@ -79,19 +79,19 @@ TRANSITIONS: tuple[Transition, ...] = (
 
 WAY_DOWN = ((_S.ACTIVE, Verb.DEACTIVATE), (_S.INACTIVE, Verb.CLEANUP))
 
-MANAGER = 'lifecycle_manager'  # name of the node that brings the others up and down
+MANAGER = 'lifecycle_manager'  # name of the node that starts and stops the others
 Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
 
 
 class Managed:
-    """One managed entity: its state, and the work of its transitions."""
+    """One managed entity: its state, and the work to do in its transitions."""
 
     def __init__(self, name: str, work: Work) -> None:
-        """A CanopenError that ``work`` of a transition raises is its failure."""
+        """A transition fails if ``work`` raises a CanopenError."""
         self.name = name  # its name, for messages
         self.state = LifecycleState.UNCONFIGURED  # its state
-        # called before and after a transition, with it, the state that was left, the one that was
-        # entered, and whether the transition has ended
+        # called before and after a transition, with the transition, the previous state, the new
+        # state, and whether the transition has ended
         self.on_change: Callable[[Transition, LifecycleState, LifecycleState, bool], None] = (
             lambda transition, before, after, ended: None
         )
@@ -99,14 +99,14 @@ class Managed:
 
     @property
     def possible(self) -> tuple[Transition, ...]:
-        """Transitions that are possible now."""
+        """Transitions available in the current state."""
         return tuple(entry for entry in TRANSITIONS if entry.start is self.state)
 
     def find(self, number: int, label: str = '') -> Transition:
         """Return a transition by label, or by number when there is no label.
 
         Raises:
-            LifecycleError: It does not exist, or not now; the message names those that do.
+            LifecycleError: It is unknown or not possible now; the message lists those that are.
         """
         for entry in self.possible:
             if (entry.verb.label == label) if label else (entry.number == number):
@@ -131,7 +131,7 @@ class Managed:
 
         Raises:
             LifecycleError: It is not possible now.
-            CanopenError: It failed; the state is what the transition has for that.
+            CanopenError: It failed; the state is then ``failure`` of the transition.
         """
         if transition.start is not self.state:
             self.find(transition.number)
@@ -144,7 +144,7 @@ class Managed:
         self._enter(transition, transition.success, ended=True)
 
     async def go(self, *verbs: Verb) -> None:
-        """Run transitions one after another, leaving out those whose end is reached already."""
+        """Run transitions in sequence, skipping those whose final state is already reached."""
         for verb in verbs:
             if not any(e.verb is verb and e.success is self.state for e in TRANSITIONS):
                 await self.change(self.find(0, verb.label))
@@ -155,10 +155,10 @@ class Managed:
 
 
 class Supervisor:
-    """Brings a master and its devices up and down in order, as ros2_canopen's manager does.
+    """Starts and stops a master and its devices in order, like ros2_canopen's manager.
 
-    The devices change side by side. When one of them cannot be activated, the others are brought
-    down again, so that no half of a robot takes commands.
+    The devices change state concurrently. If one cannot be activated, the others are stopped
+    again, so that a partly started robot accepts no commands.
     """
 
     def __init__(self, master: Managed, devices: Sequence[Managed], scheduler: Scheduler) -> None:

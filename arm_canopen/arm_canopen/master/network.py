@@ -42,14 +42,14 @@ from .sdo_client import SdoClient
 
 DEFECT_PERIOD = 10.0  # [s] between two reports of the same defect
 NEVER = float('inf')
-UPDATE_SHARE = 0.5  # of the period after SYNC, at which TPDOs that are missing are not awaited
-WATCH_PERIOD = 0.005  # [s] between two looks at the life signs, which come at most so often
+UPDATE_SHARE = 0.5  # share of the period after SYNC at which missing TPDOs are no longer awaited
+WATCH_PERIOD = 0.005  # [s] between two checks of life signs, their shortest period
 
 CycleHook: TypeAlias = Callable[[float, float], None]
 
 
 class Network:
-    """Master of one bus: boots its devices, keeps watch over them and runs the SYNC cycle."""
+    """Master of one bus: boots and supervises its devices, and runs the SYNC cycle."""
 
     def __init__(
         self,
@@ -62,14 +62,14 @@ class Network:
     ) -> None:
         """Nothing is sent before :meth:`start`; ``send`` may raise BusError.
 
-        With ``beside_master`` another master leads other devices on this bus, so that no NMT
-        command is for all nodes.
+        With ``beside_master`` another master runs other devices on this bus, so no NMT command is
+        sent to all nodes.
         """
         master = config.master
         self.config = config  # the bus
         self.scheduler = Scheduler()  # time and coroutines of the network
         self.scheduler.on_defect = self._report_defect
-        # called in each cycle before the RPDOs leave, with time and period in [s]
+        # called in each cycle before the RPDOs are sent, with time and period in [s]
         self.on_cycle: CycleHook = lambda now, period: None
         # called after each update, with the time of the SYNC in [s] whose TPDOs the drives have
         # taken
@@ -78,22 +78,22 @@ class Network:
         self.on_frame: Callable[[Frame], None] = lambda frame: None
         self.controller = ControllerWatch(report)  # the CAN controller as its error frames show it
         self.unknown_frames = 0  # frames with an identifier that no device on this bus should use
-        # sends a frame; a bus that refuses it is reported once until it works again
+        # sends a frame; reports a bus that refuses it once, until it works again
         self.send = BusSender(send, report).send
         self._report = report
         # NMT state of the master; only in Operational it sends SYNC and RPDOs
         self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
-        # when :meth:`update` is due in [s]; infinite when it is done in this cycle
+        # time at which :meth:`update` is due in [s]; infinite once it is done in this cycle
         self.next_update = NEVER
         self._sync = SyncRound(self._round_complete, master.sync_window, master.sync_period)
         self._sync_time = 0.0
         self._feedback_due = self._round_open = False
         self._watch_at = 0.0
-        self._defects: dict[object, float] = {}  # when each may be reported again, by its place
-        self._pauses: list[float] = []  # hold-ups since one was reported
+        self._defects: dict[object, float] = {}  # time of the next report, by place in the code
+        self._pauses: list[float] = []  # delays since the last report
         self._pause_reported = -NEVER
         self._sync_count = 0
-        # with the set-points, so that it ends when they do
+        # sent with the set-points, so that both stop together
         self._heartbeat = PeriodicFrame(
             CobId.HEARTBEAT + master.node_id,
             master.heartbeat_producer,
@@ -122,17 +122,17 @@ class Network:
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
-        # called with a device that shows no sign of life any more; boots it again
+        # called with a device whose life signs are missing; boots it again
         self.on_node_lost: Callable[[RemoteNode], None] = self._boots.start
         self._unconfigured_clients: dict[int, SdoClient] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
         for cob_id, take in self._connect(
             OtherMasterWatch(config, report, expected=beside_master)
         ):
-            self._handlers.setdefault(cob_id, take)  # no device displaces NMT and SYNC
+            self._handlers.setdefault(cob_id, take)  # devices must not override NMT and SYNC
 
     def start(self, now: float) -> None:
-        """Reset the devices and begin to boot them, all at the same time."""
+        """Reset the devices and start to boot all of them concurrently."""
         self.scheduler.advance(now)
         nodes = list(self.nodes.values())
         self.scheduler.background(self._startup.watch())
@@ -164,7 +164,7 @@ class Network:
         handler(frame)
 
     def advance(self, now: float) -> None:
-        """Advance the time: timers, conditions, overdue heartbeats."""
+        """Advance the time: run timers and conditions, check for overdue heartbeats."""
         self._contain(partial(self.scheduler.advance, now))
         if now < self._watch_at:
             return
@@ -176,7 +176,7 @@ class Network:
             self.on_node_lost(node)
 
     def sync(self) -> None:
-        """Send SYNC at its deadline; nothing that takes time stands before it."""
+        """Send SYNC at its deadline, before any work that takes time."""
         if self._syncs:
             overflow = self.config.master.sync_overflow
             if not overflow:
@@ -196,7 +196,7 @@ class Network:
             self._sync.start(now)
             self._contain_each(lambda node: node.expect_answers())
             self._feedback_due = True
-            if not overdue:  # what an overdue update takes has answered the SYNC before
+            if not overdue:  # TPDOs of an overdue update belong to the previous SYNC
                 self._sync_time = now
                 if self._sync.pending:
                     self.next_update = now + UPDATE_SHARE * period
@@ -204,11 +204,11 @@ class Network:
         self._contain(partial(self._time.advance, now))
 
     def update(self, now: float, period: float) -> None:
-        """Run drives and motion sources, and send the RPDOs that the next SYNC makes valid.
+        """Run drives and motion sources, and send the RPDOs that the next SYNC activates.
 
-        Due at :attr:`next_update`: when all TPDOs of the SYNC have come, or half a period after
-        it without those that are missing. The heartbeat leaves from here, so that devices stop by
-        themselves when their set-points are no longer updated.
+        Due at :attr:`next_update`: when all TPDOs of the SYNC have arrived, or at the latest half
+        a period after SYNC. The heartbeat is sent here, so that devices stop by themselves when
+        their set-points are no longer updated.
         """
         self.next_update = NEVER
         updated = self._contain(partial(self.on_cycle, now, period))
@@ -240,7 +240,7 @@ class Network:
                 node.fail(error, output)
 
     def _contain(self, step: Callable[[], object]) -> bool:
-        """Contain a step of the cycle that fails, so that the others are done."""
+        """Run a step of the cycle; report its exception and return False, so others still run."""
         try:
             step()
         except Exception as error:  # noqa: BLE001
@@ -249,7 +249,7 @@ class Network:
         return True
 
     def _contain_each(self, step: Callable[[RemoteNode], object]) -> None:
-        """Do a step for each device; one for which it fails is stopped, the others go on."""
+        """Run a step for each device; stop a device for which it fails, the others continue."""
         for node in self.nodes.values():
             try:
                 step(node)
@@ -257,13 +257,13 @@ class Network:
                 node.fail(error)
 
     def send_nmt(self, command: NmtCommand, node_id: int) -> Promise[None]:
-        """Send an NMT command to one device, or to all with id 0; our own id commands the master.
+        """Send an NMT command to one device, to all with id 0, or to the master with its own id.
 
         A master that is not operational sends neither SYNC nor RPDOs.
 
         Returns:
-            Done when the bus has taken the command, rejected with a BusError when it has not;
-            abandoned before, it does not leave.
+            Done when the bus has accepted the command, rejected with a BusError if it refuses it.
+            Abandoning the promise before cancels the command.
         """
         if node_id == self.config.master.node_id:
             self._set_state(command)
@@ -274,13 +274,13 @@ class Network:
         return self._nmt.send(command, node_id)
 
     async def command_nmt(self, command: NmtCommand, node_id: int) -> str:
-        """Send a command of a client, as :meth:`send_nmt`; return what was done, in words.
+        """Send an NMT command of a client, see :meth:`send_nmt`; return a report in words.
 
-        Axes that it would take from the master while they move are brought to rest before; those
-        that were not seen to stand are reported, too.
+        Moving axes that the command would take from the master are brought to rest first; axes not
+        confirmed at rest are reported, too.
 
         Raises:
-            BusError: The bus has not taken the command.
+            BusError: The bus has refused the command.
         """
         unseen: list[str] = []
         if command is not NmtCommand.START:
@@ -305,14 +305,14 @@ class Network:
         await self.scheduler.gather(sent)
 
     def publish_objects(self, node: RemoteNode, values: Mapping[tuple[int, int], Number]) -> None:
-        """Send objects by the RPDOs that carry them, each RPDO once.
+        """Write objects and send the RPDOs that carry them, each RPDO once.
 
-        An event-driven RPDO leaves at once, one that waits for SYNC with the next cycle, and those
-        of a drive in every cycle anyway.
+        An event-driven RPDO is sent at once, a synchronous one with the next cycle; the RPDOs of a
+        drive are sent in every cycle anyway.
 
         Raises:
             CanopenError: The device or the master is not operational, no RPDO carries one of
-                them, or the bus does not take it; the text names the RPDOs that had left by then.
+                them, or the bus refuses it; the text names the RPDOs sent before.
         """
         if not node.operational or self.state is not NmtState.OPERATIONAL:
             what = 'the master' if node.operational else node.name
@@ -343,7 +343,7 @@ class Network:
         sent: Sequence[SentRpdo],
         refusal: BusError,
     ) -> BusError:
-        """Put back the values that have not left, so that none leaves with another one."""
+        """Restore unsent values, so that they are not sent later; return the error to raise."""
         left = {(each.index, each.subindex) for output in sent for each in output.config.mapping}
         for address, value in before.items():
             if address not in left:
@@ -362,7 +362,7 @@ class Network:
             self._report(Event(EventKind.BUS, Severity.INFO, '', text))
 
     def sdo_client(self, node_id: int) -> SdoClient:
-        """Return the SDO client of any node id, also of one that bus.yml does not name."""
+        """Return the SDO client of a node id, even if bus.yml does not name it."""
         for node in self.nodes.values():
             if node.config.node_id == node_id:
                 return node.sdo
@@ -375,21 +375,21 @@ class Network:
 
     @property
     def pending_pdos(self) -> int:
-        """TPDOs of the last SYNC that :meth:`update` still waits for."""
+        """Number of TPDOs of the last SYNC that :meth:`update` still waits for."""
         return self._sync.pending if self.next_update < NEVER else 0
 
     @property
     def missed_pdos(self) -> int:
-        """TPDOs that did not answer a SYNC, over all devices."""
+        """Number of TPDOs that did not answer a SYNC, over all devices."""
         return sum(node.pdos.missed for node in self.nodes.values())
 
     @property
     def late_pdos(self) -> int:
-        """TPDOs that answered a SYNC after the synchronous window was over."""
+        """Number of TPDOs that answered a SYNC after the synchronous window."""
         return self._sync.late
 
     def _report_defect(self, error: BaseException) -> None:
-        # by where it was raised, as its text may have other values in it each time
+        # keyed by place of origin, as the values in its text may differ each time
         place = tuple((frame.f_code, line) for frame, line in walk_tb(error.__traceback__))
         if self.scheduler.now < self._defects.get(place, 0.0):
             return
@@ -415,16 +415,16 @@ class Network:
                 yield node.config.emergency_id, node.emergencies.receive
 
     def _receive_nmt(self, frame: Frame) -> None:
-        """Note what another master or a tool commands, so that it is not worked against."""
+        """Record NMT commands of another master or tool, so as not to counteract them."""
         parsed = parse_nmt(frame.data)
         if parsed is not None:
             self._note_nmt(*parsed)
 
     def note_pause(self, late: float, now: float) -> None:
-        """Report that a cycle came so many [s] late, before its consequences show.
+        """Report a cycle that is ``late`` in [s], before its consequences show.
 
-        On a busy computer once in a while, with what there was since. Devices are not blamed for
-        what no SYNC asked of them.
+        Reports on a busy computer are rate-limited and include the delays since the last. Missing
+        TPDOs that no SYNC requested are not counted against devices.
         """
         for node in self.nodes.values():
             node.pdos.excuse(late)
@@ -451,6 +451,6 @@ class Network:
                 node.note_command(command)
 
     def _round_complete(self) -> None:
-        """Update now, unless that is done already in this cycle."""
+        """Make the update due now, unless this cycle has already done it."""
         if self.next_update < NEVER:
             self.next_update = self.scheduler.now

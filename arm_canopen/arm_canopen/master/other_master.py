@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Another master on the bus: the frames by which it is known, and looking for it beforehand.
+"""Detection of another master on the bus by its frames, also before this master starts.
 
 Two masters command the same drives, and the first thing that a master does is to reset them. So it
 listens before it sends a frame.
@@ -20,13 +20,13 @@ from canopen_core.standard import CobId, nmt_addressee, parse_nmt
 from ..config.model import BusConfig
 from .events import Event, EventKind, Report, Severity
 
-LISTENING_TIME = 0.2  # [s] a start takes longer by it; a master that runs may be held up as long
-CATCH_UP_MAX = 5.0  # [s] to read what has come until then, where this process is slow
+LISTENING_TIME = 0.2  # [s] added to each start; a running master may pause as long
+CATCH_UP_MAX = 5.0  # [s] to read all frames received until then in a slow process
 FRAMES_REPORTED = 3
 
 
 class Evidence(IntEnum):
-    """How clearly a frame shows its sender, the clearest first."""
+    """How clearly a frame proves another master, the strongest evidence first."""
 
     COMMAND = 0
     HEARTBEAT = 1
@@ -35,7 +35,7 @@ class Evidence(IntEnum):
 
     @property
     def title(self) -> str:
-        """Such frames, in words."""
+        """Description of such frames."""
         return ('NMT commands', 'its heartbeat', 'SYNC', 'RPDOs')[self]
 
 
@@ -43,15 +43,15 @@ class Evidence(IntEnum):
 class MasterFrame:
     """A kind of frame that only the master of a bus sends."""
 
-    evidence: Evidence  # how clearly it shows its sender
-    text: str  # what it is, in words
+    evidence: Evidence  # how clearly it proves another master
+    text: str  # description
 
 
 class MasterFrames:
-    """Reads from frames of others what only the master of this bus would send."""
+    """Recognizes frames that only the master of this bus would send."""
 
     def __init__(self, config: BusConfig | None) -> None:
-        """Note which frames are the master's, by ``config`` where a file describes the bus."""
+        """Collect the COB-IDs of the master, from ``config`` if a file describes the bus."""
         self._frames: dict[int, MasterFrame] = {}
         sync = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
         if config is None:
@@ -74,7 +74,7 @@ class MasterFrames:
             self._frames[CobId.SYNC] = sync
 
     def read(self, frame: Frame) -> MasterFrame | None:
-        """Return what a frame of another station means, None when any device may send it."""
+        """Return which master frame it is, None if any device may send it."""
         if frame.is_extended or frame.is_remote or frame.is_error:
             return None
         if frame.can_id == CobId.NMT:
@@ -83,17 +83,17 @@ class MasterFrames:
 
 
 class OtherMasterWatch:
-    """Reports once for each kind of frame that another node sends what only the master sends."""
+    """Reports master frames sent by another node, once for each kind."""
 
     def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
-        """``expected``: the other master is meant to be there."""
+        """``expected`` is True if another master is intended on this bus."""
         self._frames = MasterFrames(config)
         self._report = report
         self._severity = Severity.WARNING if expected else Severity.ERROR
         self._reported: set[MasterFrame] = set()
 
     def receive(self, frame: Frame) -> None:
-        """Process a frame of another participant."""
+        """Process a frame of another node."""
         kind = self._frames.read(frame)
         if kind is not None and kind not in self._reported:
             self._reported.add(kind)
@@ -108,22 +108,22 @@ def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[M
     """Listen for another master on a bus that is not read elsewhere, without sending.
 
     Returns:
-        Its frames by kind, and how many of each; empty when there is none.
+        Number of its frames by kind; empty if there is no other master.
 
     Raises:
-        OtherMasterError: None was found, but what came meanwhile could not all be read in time.
+        OtherMasterError: None was found, but not all received frames could be read in time.
     """
     known, found = MasterFrames(config), Counter[MasterFrame]()
     begin = clock()
     end = begin + LISTENING_TIME
-    # thousands may wait from before, whose reading takes longer than the listening
+    # thousands of earlier frames may be queued, and take longer to read than the listening time
     while True:
         left = end - clock()
         try:
             frames = bus.receive(max(0.0, left))
-        except BusError:  # nothing can be received now; it raises again when it is used
+        except BusError:  # nothing can be received; the next use raises again
             break
-        # what came before may be the last words of a master that has ended since
+        # earlier frames may be the last ones of a master that has ended since
         fresh = (known.read(frame) for frame in frames if frame.timestamp >= begin)
         found.update(kind for kind in fresh if kind is not None)
         if left <= 0.0 and (not frames or frames[-1].timestamp >= end):
@@ -139,17 +139,17 @@ def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[M
 
 
 def describe(found: Counter[MasterFrame]) -> str:
-    """Name the frames of another master, the clearest first."""
+    """List the frames of another master in words, the strongest evidence first."""
     return ', '.join(
         f'{kind.text} {found[kind]} times' for kind in sorted(found)[:FRAMES_REPORTED]
     )
 
 
 def refuse_other_master(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> None:
-    """Listen, and refuse a bus that another master leads.
+    """Listen, and refuse a bus that has another master.
 
     Raises:
-        OtherMasterError: Another master leads the bus, and the message names its frames; or the
+        OtherMasterError: Another master is on the bus, and the message lists its frames; or the
             bus could not be read to its end.
     """
     try:

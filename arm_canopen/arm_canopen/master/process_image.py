@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process image of one device: last values of its TPDOs, next values for its RPDOs.
 
-Values are addressed once, by object, when a reader or writer is made; in the cycle they
+Objects are looked up once, when a reader or writer is created; in the cycle values
 are list look-ups. Objects that no PDO carries are read and written by SDO in the background.
 """
 
@@ -29,8 +29,8 @@ from ..config.model import PdoConfig
 from ..config.model.bus import longest_silence, loss_unnoticed
 from .scheduler import completed, Promise
 
-REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
-IN_THE_IMAGE = completed()  # what leaves with the PDOs of this cycle counts as delivered
+REPEAT_SHARE = 0.5  # share of the deadline of an RPDO after which it is repeated
+IN_THE_IMAGE = completed()  # a value sent with the PDOs of this cycle counts as delivered
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 Limits: TypeAlias = tuple[Number, Number]
@@ -38,7 +38,7 @@ Listener: TypeAlias = 'Callable[[ReceivedTpdo], None]'
 
 
 def limits_of(data_type: DataType) -> Limits:
-    """Return the smallest and the largest number that a type holds."""
+    """Return the smallest and largest value of a data type."""
     return integer_range(data_type) or (-math.inf, math.inf)
 
 
@@ -48,16 +48,16 @@ class SyncRound:
     def __init__(
         self, complete: Callable[[], None], window: float = 0.0, period: float = 0.0
     ) -> None:
-        """They should come within the ``window`` after SYNC in [s] (0x1007); 0 for no limit."""
+        """``window`` is the synchronous window after SYNC in [s] (0x1007); 0 for no limit."""
         self.period = period  # time between two SYNCs in [s]; 0 where this master sends none
-        self.pending = 0  # how many expected TPDOs have not yet come
-        self.late = 0  # how many have come after the synchronous window was over
-        self.complete = complete  # called when the last one has come
+        self.pending = 0  # number of expected TPDOs not yet received
+        self.late = 0  # number of TPDOs received after the synchronous window
+        self.complete = complete  # called when the last one has arrived
         self._window = window
         self._sync_time = 0.0
 
     def start(self, now: float) -> None:
-        """A SYNC is about to be sent; each :class:`ReceivedTpdo` adds itself if expected."""
+        """Start a round before a SYNC; each expected :class:`ReceivedTpdo` adds itself."""
         self.pending = 0
         self._sync_time = now
 
@@ -77,29 +77,29 @@ class ReceivedTpdo:
         self.codec = PdoCodec(config.mapping)  # its compiled mapping
         # last values in mapping order, None before the first
         self.values: tuple[Number, ...] | None = None
-        self.timestamp = 0.0  # steady time of arrival of the last in [s]
-        self.excused = 0.0  # time since then in [s] in which no SYNC asked for it
+        self.timestamp = 0.0  # steady time of the last arrival in [s]
+        self.excused = 0.0  # time since then in [s] without a SYNC that requests it
         self.count = 0  # number of PDOs received
         self.length_errors = 0  # number of PDOs that were too short
         self._listeners: tuple[Listener, ...] = ()  # replaced as a whole, by any thread
         self._listening = threading.Lock()
-        # called with this input and the length when one is too short
+        # called with this object and the length if a PDO is too short
         self.on_short: Callable[[ReceivedTpdo, int], None] = lambda entry, length: None
-        self.awaited = False  # it was expected after the last SYNC and has not come
-        # age in [s] from which its values are too old to act on; infinite for a TPDO that has no
-        # time to come in, and may well be silent
+        self.awaited = False  # it is expected after the last SYNC and has not arrived
+        # age in [s] from which its values are too old to act on; infinite for a TPDO without a
+        # period, which may be silent
         self.stale_after = longest_silence(config, sync.period)
         self._sync = sync
         self._unpack = self.codec.unpack
 
     @property
     def every_sync(self) -> bool:
-        """The device sends it after each SYNC."""
+        """Whether the device sends it after each SYNC."""
         return self.config.transmission == 1
 
     @property
     def synchronous(self) -> bool:
-        """The device sends it after every nth SYNC."""
+        """Whether the device sends it after every nth SYNC."""
         return 1 <= self.config.transmission <= SYNCHRONOUS_MAX
 
     def stale(self, now: float) -> bool:
@@ -108,31 +108,31 @@ class ReceivedTpdo:
 
     @property
     def loss_unnoticed(self) -> bool:
-        """Whether it carries state of a drive, and nothing shows that it got lost."""
+        """Whether it carries drive state and its loss would go unnoticed."""
         return loss_unnoticed(self.config, self.stale_after)
 
     def rely_on_timer(self, *, taken: bool) -> None:
-        """Await it by its event timer, or no more where the device has not taken that."""
+        """Expect it at the period of its event timer; not if the device refused the timer."""
         silence = longest_silence(self.config, self._sync.period)
         self.stale_after = silence if taken else math.inf
 
     def listen(self, listener: Listener) -> None:
-        """Call a listener with this TPDO whenever it came, in the thread of the cycle."""
+        """Call a listener with this TPDO at each arrival, in the thread of the cycle."""
         with self._listening:
             self._listeners = (*self._listeners, listener)
 
     def ignore(self, listener: Listener) -> None:
-        """Call a listener no more."""
+        """Remove a listener."""
         with self._listening:
             self._listeners = tuple(each for each in self._listeners if each != listener)
 
     def clear(self) -> None:
-        """Forget the values, because the device restarted or went away."""
+        """Forget the values, because the device restarted or is lost."""
         self.values = None
         self.awaited = False
 
     def expect(self) -> None:
-        """A SYNC is about to be sent; what answered before is expected to answer again."""
+        """Expect an answer to the SYNC that is about to be sent, if it answered before."""
         self.awaited = self.values is not None
         self._sync.pending += self.awaited
 
@@ -158,30 +158,30 @@ class SentRpdo:
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
         self.config = config  # its configuration
-        # it leaves in every cycle; otherwise when a client published one of its objects
+        # it is sent in every cycle; otherwise when a client publishes one of its objects
         self.cyclic = cyclic
-        self.due = False  # it was published, and leaves with the next cycle
-        # axes that are commanded by SDO; while there are any, it does not leave
+        self.due = False  # it was published and is sent with the next cycle
+        # axes that are commanded by SDO; while there are any, it is not sent
         self.kept_back_by: set[object] = set()
-        self.skips = False  # it does not leave in this cycle
+        self.skips = False  # it is not sent in this cycle
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
-        self._brought: list[Number] = []  # its values when it left last
+        self._brought: list[Number] = []  # values when it was last sent
         self.codec = PdoCodec(config.mapping)  # its compiled mapping
         # next values in mapping order
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
         self._packed: list[Number] = []
-        self._frame = Frame(config.cob_id)  # that carries these
+        self._frame = Frame(config.cob_id)  # frame with these values
 
     @property
     def synchronous(self) -> bool:
-        """The device applies it at the next SYNC."""
+        """Whether the device applies it at the next SYNC."""
         return self.config.transmission <= SYNCHRONOUS_MAX
 
     def leaves(self, now: float) -> bool:
-        """Return whether it leaves in this cycle, at a time in [s].
+        """Return whether it is to be sent in this cycle, at a time in [s].
 
-        One with a deadline is repeated within it, once a client has published it.
+        An RPDO with a deadline is repeated within it, once a client has published it.
         """
         if self.skips:
             self.skips = False
@@ -192,22 +192,22 @@ class SentRpdo:
         return self.due or repeat
 
     def sent(self, position: int) -> Number | None:
-        """Return what it has brought of an object since the device booted, None for nothing."""
+        """Return the last value sent at a mapping position since the boot, or None."""
         if self._left_at is None:
             return None
         return (self._brought if self.due else self.values)[position]
 
     def left(self, now: float) -> None:
-        """The bus has taken it, at a time in [s], because it was published."""
+        """Record that the published RPDO was sent, at a time in [s]."""
         self.due, self._left_at, self._brought = False, now, [*self.values]
 
     def reset(self) -> None:
-        """The device is another one than before: nothing was published to it."""
+        """Forget what was published, because the device restarted."""
         self.due, self._left_at, self.skips = False, None, False
         self.kept_back_by.clear()
 
     def frame(self) -> Frame:
-        """Return the frame that carries the present values; the one of before as they stand."""
+        """Return the frame with the present values; reuse it while they are unchanged."""
         if self.values != self._packed:
             self._frame = Frame(self.config.cob_id, self.codec.pack(self.values))
             self._packed = self.values.copy()
@@ -215,25 +215,25 @@ class SentRpdo:
 
 
 class Writer(Protocol):
-    """Next value of an object of the device."""
+    """Interface to write the next value of an object of the device."""
 
     @property
     def limits(self) -> Limits:
-        """Smallest and largest value that the object holds."""
+        """Smallest and largest value of the object."""
 
     @property
     def by_sdo(self) -> bool:
         """Whether it goes by SDO, because no RPDO carries it."""
 
     def write(self, value: Number) -> None:
-        """Hold a value in the device, cycle by cycle; by SDO it is sent when it changed.
+        """Keep a value in the device, called each cycle; an SDO is sent only if it changed.
 
         Raises:
             CodecError: The object cannot hold it; the one before is kept.
         """
 
     def deliver(self, value: Number) -> Promise[None]:
-        """Send a value once, whatever the device has; of those that wait the newest counts.
+        """Send a value once, even if unchanged; a newer value replaces one still waiting.
 
         Returns:
             Done when the device has it, or will have it with the PDOs of this cycle.
@@ -252,22 +252,22 @@ class InputReader:
 
     @property
     def value(self) -> Number | None:
-        """The value, None while unknown."""
+        """Current value, None while unknown."""
         values = self.source.values
         return None if values is None else values[self._position]
 
     def correct(self, value: Number) -> None:
-        """Replace the value by one that was read by SDO, as its TPDO got lost."""
+        """Replace the value by one read by SDO, because its TPDO was lost."""
         values = [*(self.source.values or ())]
         values[self._position : self._position + 1] = [value]
         self.source.values = tuple(values)
 
 
 class OutputWriter:
-    """Writes an object into every RPDO that carries it, so that none brings an old value.
+    """Writes an object to every RPDO that carries it, so that none sends an old value.
 
-    A value that cannot be packed is refused here, where its writer is known: in the RPDO it would
-    keep everything else that it carries from being sent, the controlword too.
+    A value that cannot be encoded is refused here, where its source is known: in the RPDO it would
+    block all other objects, including the controlword.
     """
 
     by_sdo = False  # it does not go by SDO
@@ -276,7 +276,7 @@ class OutputWriter:
         self._places = [(output.values, position) for output, position in places]
         output, position = places[0]
         self._mapped = output.config.mapping[position]
-        # smallest and largest value that the object holds
+        # smallest and largest value of the object
         self.limits = limits_of(self._mapped.data_type)
         self._low, self._high = self.limits
 
@@ -292,13 +292,13 @@ class OutputWriter:
             values[position] = value
 
     def deliver(self, value: Number) -> Promise[None]:
-        """Set the value for the next PDOs, which leave in this cycle; errors as of a write."""
+        """Set the value for the next PDOs, sent in this cycle; raises as :meth:`write`."""
         self.write(value)
         return IN_THE_IMAGE
 
 
 class ProcessImage:
-    """All PDOs of one device that are in use."""
+    """All enabled PDOs of one device."""
 
     def __init__(
         self,
@@ -313,43 +313,43 @@ class ProcessImage:
         """Compile the enabled PDOs.
 
         Args:
-            tpdos: What the device sends.
-            rpdos: What it receives.
+            tpdos: PDOs that the device sends.
+            rpdos: PDOs that it receives.
             sync: The round that all TPDOs of the bus belong to.
-            start: Returns what an object in an RPDO carries until it is written.
-            cyclic: RPDOs leave in every cycle; otherwise when they are published.
+            start: Returns the initial value of an object in an RPDO.
+            cyclic: RPDOs are sent in every cycle; otherwise when published.
             send_last: Returns of an index whether RPDOs with that object leave after the others:
                 commands, which must not overtake their data.
         """
-        # those that it sends
+        # PDOs that the device sends
         self.tpdos = [ReceivedTpdo(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
         used = [
             SentRpdo(pdo, start, cyclic=cyclic) for pdo in rpdos if pdo.enabled and pdo.mapping
         ]
-        # those that it gets, in the order in which they are sent
+        # PDOs that it receives, in the order of sending
         self.rpdos = sorted(
             used, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
-        self._places: dict[tuple[int, int], list[tuple[SentRpdo, int]]] = {}  # of each object
+        self._places: dict[tuple[int, int], list[tuple[SentRpdo, int]]] = {}  # RPDOs by object
         for output in self.rpdos:
             for position, mapped in enumerate(output.config.mapping):
                 places = self._places.setdefault((mapped.index, mapped.subindex), [])
                 places.append((output, position))
 
     def clear(self) -> None:
-        """Forget what the device sent."""
+        """Forget the values that the device sent."""
         for entry in self.tpdos:
             entry.clear()
         for output in self.rpdos:
             output.reset()
 
     def skip_cycle(self, index: int, subindex: int = 0) -> None:
-        """Send no RPDO with an object in this cycle; those of other axes leave."""
+        """Skip the RPDOs with an object in this cycle; those of other axes are sent."""
         for output, _ in self._places.get((index, subindex), ()):
             output.skips = True
 
     def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:
-        """Write a value of an object to the RPDOs that carry it; return those."""
+        """Write a value to the RPDOs that carry an object; return these RPDOs."""
         places = self._places.get((index, subindex), ())
         for output, position in places:
             output.values[position] = value
@@ -369,11 +369,11 @@ class ProcessImage:
         return OutputWriter(places) if places else None
 
     def is_applied_first(self, index: int, subindex: int, *, command: int) -> bool:
-        """Return whether a value takes effect no later than a command of the same cycle.
+        """Return whether a value takes effect no later than a command in the same cycle.
 
-        That is so where one RPDO alone carries the command, and each RPDO with the value is that
-        one or a faster one: event-driven, and sent before it. Several synchronous RPDOs are
-        applied at SYNC in an order that is the device's own affair.
+        True if only one RPDO carries the command, and each RPDO with the value is either that one
+        or event-driven and sent before it. The order in which a device applies several synchronous
+        RPDOs at SYNC is not defined.
         """
         commands = [entry for entry, _ in self._places.get((command, 0), ())]
         if len(commands) != 1:
@@ -385,20 +385,20 @@ class ProcessImage:
         )
 
     def commanded(self, index: int, subindex: int = 0) -> Number | None:
-        """Return what the RPDOs carry for an object, None when none carries it."""
+        """Return the next value of an object in the RPDOs, None if none carries it."""
         for entry, position in self._places.get((index, subindex), ()):
             return entry.values[position]
         return None
 
     def sent(self, index: int, subindex: int) -> Number | None:
-        """Return what an RPDO has brought of an object since the device booted, else None."""
+        """Return the last value of an object sent by RPDO since the boot, else None."""
         for entry, position in self._places.get((index, subindex), ()):
             if (value := entry.sent(position)) is not None:
                 return value
         return None
 
     def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:
-        """Return how an object stands in an RPDO, None when it is in none."""
+        """Return the mapping entry of an object in an RPDO, None if not mapped."""
         for entry, position in self._places.get((index, subindex), ()):
             return entry.config.mapping[position]
         return None

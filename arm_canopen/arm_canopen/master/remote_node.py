@@ -30,18 +30,18 @@ from .remote_objects import RemoteObjects
 from .scheduler import Promise, Scheduler
 from .sdo_channel import SdoCounters
 
-START_TIME = 0.25  # [s] in which a device follows the command to start
-LIVE_SHARE = 0.5  # of the consumer time of its life signs, in which a TPDO shows that it lives
-RESET_TIME = 10.0  # [s] in which a device that was reset has sent its boot-up message
-FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0  # [s] before a device that drops out is booted again
-STABLE_TIME = 10.0  # [s] in operation after which a drop is the first one again
+START_TIME = 0.25  # [s] for a device to follow the NMT start command
+LIVE_SHARE = 0.5  # share of the heartbeat consumer time in which a TPDO proves it alive
+RESET_TIME = 10.0  # [s] until a device that was reset sends its boot-up message
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0  # [s] before a lost device is booted again
+STABLE_TIME = 10.0  # [s] in operation after which the count of losses restarts
 
 
 LeadToRest: TypeAlias = Callable[[str, Severity], Coroutine[Promise[Any], None, bool]]
 
 
 class BootPhase(Enum):
-    """How far a device has come; the value is how a person reads it."""
+    """Progress of the boot of a device; the value is the text for the user."""
 
     WAITING = 'waiting for the device'
     STATE = 'asking for its NMT state'
@@ -56,7 +56,7 @@ class BootPhase(Enum):
 
 
 class RemoteNode:
-    """One device on the bus."""
+    """One device on the bus, as the master sees it."""
 
     def __init__(
         self,
@@ -78,27 +78,27 @@ class RemoteNode:
         self.image = self.objects.image  # its process image
         self.sdo = self.objects.sdo  # its SDO client
         # NMT state as received, None before the first heartbeat or boot-up and after a loss; the
-        # commanded one of a device without heartbeat and guarding, and where it leaves Operational
+        # commanded state if it has no heartbeat or guarding, or is commanded out of Operational
         self.nmt_state: NmtState | None = None
-        self.phase = BootPhase.WAITING  # how far it has booted
-        self.phase_detail = ''  # what it is doing in that phase, or why it failed
+        self.phase = BootPhase.WAITING  # progress of its boot
+        self.phase_detail = ''  # current step of that phase, or why it failed
         # online, but another node stopped it or sent it to pre-operational
         self.left_operational = False
-        # NMT state that was commanded last, by whomever on this bus; None when unknown
+        # last NMT state commanded by any node on this bus; None if unknown
         self.wanted: NmtState | None = None
-        # it was in operation already when it came online, and has not been disturbed since
+        # it was already operational when it came online, and was not disturbed since
         self.taken_over = False
-        self.watch_slot = 0  # entry of its 0x1016 by which it watches the master, 0 for none
-        self.loss = ''  # why it was lost last, empty while it is online
+        self.watch_slot = 0  # its entry of 0x1016 for the master, 0 for none
+        self.loss = ''  # reason of the last loss, empty while it is online
         self.life = LifeSigns(config, send)  # its heartbeat, or its answers to node guarding
         self.emergencies = EmergencyLog(self.report)  # its EMCYs
-        self.pdos = PdoWatch(self.image.tpdos, self.report)  # whether its TPDOs come
+        self.pdos = PdoWatch(self.image.tpdos, self.report)  # supervision of its TPDOs
         # sends it an NMT command
         self.send_nmt: Callable[[NmtCommand], object] = lambda command: None
         self.on_boot_up: Callable[[], None] = lambda: None  # called when it has restarted
         # its drivers, which stop; each gets the reason
         self.on_lost: list[Callable[[str], None]] = []
-        # called when it was lost by itself; what an NMT command does to it is no loss
+        # called when it is lost, other than by an NMT command
         self.on_gone: Callable[[], None] = lambda: None
         # its drivers, which bring what moves to rest and take its power away, for a reason that
         # is reported with a severity; each returns whether that was seen
@@ -112,29 +112,29 @@ class RemoteNode:
         # called when it has to be booted again, though it did not restart, with the time to leave
         # it alone before in [s]
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
-        self._drops = 0  # drops out of operation in a row
+        self._drops = 0  # consecutive losses
         self._booted_at = 0.0
         self._commanded: NmtCommand | None = None
         self._commanded_at = 0.0
 
     @property
     def operational(self) -> bool:
-        """Online, and neither stopped nor sent to pre-operational."""
+        """Whether it is online and not commanded out of Operational."""
         return self.online and not self.left_operational
 
     @property
     def was_booted(self) -> bool:
-        """Whether this master has booted it, so that its axes may move by a command of ours."""
+        """Whether this master booted it, so that this master's commands may move its axes."""
         return self.online or bool(self.loss)
 
     @property
     def left_by_itself(self) -> bool:
-        """Whether no NMT command has brought it where it is."""
+        """Whether no NMT command explains its present state."""
         return not self._being_reset and self.wanted in {None, NmtState.OPERATIONAL}
 
     @property
     def phase_text(self) -> str:
-        """How far it has booted, in words."""
+        """Progress of its boot, in words."""
         return f'{self.phase.value} {self.phase_detail}'.rstrip()
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
@@ -142,7 +142,7 @@ class RemoteNode:
         self._report(Event(kind, severity, self.name, text))
 
     def expect_answers(self) -> None:
-        """A SYNC is about to be sent: await the TPDOs that answer each one."""
+        """Expect the TPDOs that answer each SYNC; call it before a SYNC is sent."""
         if self.online:
             self.pdos.expect()
 
@@ -169,7 +169,7 @@ class RemoteNode:
             self.on_dropped_out(pause)
 
     def note_command(self, command: NmtCommand) -> None:
-        """An NMT command for this device is on the bus, from this master or from another."""
+        """Process an NMT command for this device, from this master or another node."""
         ran = self.left_operational or NmtState.OPERATIONAL in (self.wanted, self.nmt_state)
         self.wanted = COMMANDED_STATES.get(command)
         self._commanded = command
@@ -183,23 +183,23 @@ class RemoteNode:
             if self.online and ran:
                 self._commanded_away(self.wanted)
         elif self.left_operational:  # its TPDOs and life signs show whether it starts
-            self.image.clear()  # what came after it was commanded away
+            self.image.clear()  # values received after it was commanded out of Operational
             self.left_operational = False
 
     def _commanded_away(self, state: NmtState) -> None:
-        """Act at once on a command to leave Operational; its next life sign may be far away."""
+        """React at once to a command to leave Operational, before its next life sign."""
         now = self._scheduler.now
         if self.life.missed and self._lives(now):
-            self.life.start(now)  # the TPDOs that have shown that it lives end now
+            self.life.start(now)  # its TPDOs, which proved it alive, end now
         self._nmt_state_changed(state, ran=True)
 
     def go_online(self, now: float, *, taken_over: bool = False) -> None:
-        """The device is booted: talk to it, and await its first life sign from ``now`` on.
+        """Mark the booted device online, and expect its first life sign from ``now`` in [s] on.
 
-        One that is ``taken_over`` was in operation already, and was not disturbed.
+        A device that is ``taken_over`` was already operational, and was not disturbed.
         """
         self.taken_over = taken_over
-        self.image.clear()  # what it sent before it was configured is no longer true
+        self.image.clear()  # values sent before its configuration are outdated
         self.online = True
         self._failed = False
         self._booted_at = now
@@ -209,7 +209,7 @@ class RemoteNode:
             self.pdos.warn_of_losses()
 
     def watch(self, now: float) -> bool:
-        """Check for overdue life signs and PDOs; return whether it was lost now."""
+        """Check for overdue life signs and PDOs; return whether the device was lost now."""
         self.emergencies.look(now)
         missing = self.life.overdue(now)
         if missing:
@@ -225,15 +225,15 @@ class RemoteNode:
         return False
 
     def _lives(self, now: float) -> bool:
-        """Return whether its TPDOs show that it is in operation, though a life sign is missing."""
+        """Return whether its TPDOs prove it operational although a life sign is missing."""
         recent = now - self.pdos.last <= LIVE_SHARE * self.life.consumer_time
         return recent and self.operational and not self.life.silent
 
     def _miss(self, missing: str, now: float) -> None:
-        """Lead a device to rest before it counts as lost, as its configuration would let it coast.
+        """Bring a device to rest before it counts as lost, as it would coast otherwise.
 
-        Only when a life sign is missing twice in a row; the TPDOs show as much. From then on it is
-        lost, even if one comes again: its drivers have no power any more.
+        This begins when two consecutive life signs are missing while TPDOs arrive. The device is
+        lost then, even if a life sign arrives again: its drives have no power any more.
         """
         self._missing = missing
         if not self._lives(now):
@@ -247,14 +247,14 @@ class RemoteNode:
     def bring_to_rest(
         self, reason: str, severity: Severity = Severity.ERROR
     ) -> Promise[list[bool]]:
-        """Bring all its axes to rest at the same time; for each, whether that was seen."""
+        """Bring all its axes to rest; the promise returns for each whether it was confirmed."""
         ends = [self._scheduler.spawn(lead(reason, severity)) for lead in self.lead_to_rest]
         return self._scheduler.spawn(self._scheduler.gather(ends))
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop its drivers, because a step of the cycle failed, or ``output`` cannot be sent.
 
-        Other devices go on.
+        Other devices continue.
         """
         for driver_fails in self.on_failed:
             driver_fails(error, output)
@@ -264,7 +264,7 @@ class RemoteNode:
             self.report(EventKind.PDO, Severity.ERROR, f'its part of the cycle failed: {text}')
 
     def restarted(self) -> None:
-        """It sent a boot-up message: it is another one than before."""
+        """Handle its boot-up message: the device is lost, or stays offline."""
         self.sdo.restarted()
         if self.online:
             self.lost('restarted: a boot-up message came while it was operational')
@@ -272,7 +272,7 @@ class RemoteNode:
             self.offline('the device restarted')
 
     def lost(self, reason: str) -> None:
-        """The device is gone: forget its values, and stop its drivers."""
+        """Handle the loss of the device: forget its values and stop its drivers."""
         severity = Severity.ERROR
         if self._being_reset and self._commanded is not None:
             reason = f'restarts, by the NMT command {self._commanded.name}'
@@ -288,7 +288,7 @@ class RemoteNode:
             self.on_gone()
 
     def offline(self, reason: str) -> None:
-        """Stop talking to the device until it is booted again."""
+        """Stop communication with the device until it is booted again."""
         self.online = False
         self.left_operational = False
         self.life.stop()
@@ -296,7 +296,7 @@ class RemoteNode:
         self.objects.forget(reason)
 
     async def unwatch(self) -> None:
-        """Stop the device watching the master, before the master ends; never raises."""
+        """Disable the supervision of the master by the device, before it ends; never raises."""
         if not self.online or not self.watch_slot:
             return
         try:
@@ -312,7 +312,7 @@ class RemoteNode:
 
     @property
     def is_mute(self) -> bool:
-        """Whether it never sends its NMT state, so that it counts as in the commanded one."""
+        """Whether it never sends its NMT state, so the commanded state is assumed."""
         return not self.config.heartbeat_producer and not self.config.uses_node_guarding
 
     def _why_dropped(self) -> str:
@@ -335,7 +335,7 @@ class RemoteNode:
         return started and followed and state is not NmtState.OPERATIONAL
 
     def _nmt_state_changed(self, state: NmtState, *, ran: bool = False) -> None:
-        """Note a state that it shows or, in ``ran`` Operational before, was commanded to enter."""
+        """Handle a new NMT state, received or commanded; ``ran``: it was Operational before."""
         before, self.nmt_state = self.nmt_state, state
         left_before = self.left_operational
         self.left_operational = (
@@ -355,7 +355,7 @@ class RemoteNode:
             self._stop_drivers(f'{who} NMT state {state.name}')
 
     def _stop_drivers(self, reason: str) -> None:
-        self.taken_over = False  # from now on it is commanded anew
+        self.taken_over = False  # this master commands it from now on
         for driver_stops in self.on_lost:
             driver_stops(reason)
 
@@ -369,14 +369,14 @@ class NodeStatus:
     online: bool  # booted, and not lost since
     nmt_state: NmtState | None  # NMT state as received, None before the first
     left_operational: bool  # online, but an NMT command took it out of Operational
-    phase: BootPhase  # how far it has booted
-    phase_detail: str  # what it is doing in that phase, or why it failed
-    # time since the last heartbeat in [s]; None when there was none or none is supervised
+    phase: BootPhase  # progress of its boot
+    phase_detail: str  # current step of that phase, or why it failed
+    # time since the last heartbeat in [s]; None before the first or without supervision
     heartbeat_age: float | None
-    emergency: Emergency | None  # last EMCY that the device did not take back
-    emergencies: tuple[str, ...]  # the last EMCYs with their age, the newest first, in words
+    emergency: Emergency | None  # last EMCY that was not reset
+    emergencies: tuple[str, ...]  # the last EMCYs in words with their age, newest first
     missed_pdos: int  # TPDOs that did not answer a SYNC
-    sdo: SdoCounters  # what became of the SDO transfers
+    sdo: SdoCounters  # results of the SDO transfers
 
 
 def node_status(node: RemoteNode, now: float) -> NodeStatus:

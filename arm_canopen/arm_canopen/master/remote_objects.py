@@ -37,23 +37,23 @@ from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRou
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 
-INPUTS_TIME = 0.5  # [s] in which a device that was started has sent its inputs, if it does
-WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
-REFUSED_PAUSE = 1.0  # [s] before a value that was refused is written again, doubled each time
-DOUBLED_MAX = 5  # times
+INPUTS_TIME = 0.5  # [s] after the start in which a device sends its inputs, if it does
+WRITE_PAUSE = 0.05  # [s] between two writes of a changing value
+REFUSED_PAUSE = 1.0  # [s] before a refused value is written again, doubled each time
+DOUBLED_MAX = 5  # how often this pause is doubled
 REAL32_MAX = (2.0 - 2.0**-23) * 2.0**127
 
 ReportOfDevice = Callable[[EventKind, Severity, str], None]
 
 
 def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
-    """Return the value that an object has by the files when the device is booted.
+    """Return the value of an object after the boot of its device, by the files.
 
     An object without commands (a torque limit, a profile velocity, digital outputs) must keep
     what bus.yml wrote or else what its EDS has as default.
 
     Returns:
-        The value; 0 when neither has one that fits the object.
+        The value; 0 if neither defines one that fits the object.
     """
     value = config.value_after_boot(mapped.index, mapped.subindex, mapped.data_type)
     if isinstance(value, (int, float)):
@@ -66,18 +66,18 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
 
 
 class BackgroundReader:
-    """An object that no TPDO carries; it is polled by SDO."""
+    """Polls an object that no TPDO carries by SDO."""
 
-    count = 0  # of TPDOs with it
+    count = 0  # number of TPDOs with the object
 
     def __init__(self, stale_after: float) -> None:
         self.value: Number | None = None  # the value, None while unknown
-        self.timestamp = 0.0  # steady time of its last answer in [s]
+        self.timestamp = 0.0  # steady time of the last answer in [s]
         self.stale_after = stale_after  # age in [s] from which the value is too old to act on
 
     @property
     def source(self) -> BackgroundReader:
-        """Itself: it is polled alone."""
+        """The reader itself, as it is polled alone."""
         return self
 
     def stale(self, now: float) -> bool:
@@ -86,7 +86,7 @@ class BackgroundReader:
 
 
 class QueuedWrite(NamedTuple):
-    """A value that waits for its transfer."""
+    """A value queued for its transfer."""
 
     value: Number  # the value
     written: Promise[None]  # done when the device has it
@@ -96,7 +96,7 @@ class QueuedWrite(NamedTuple):
 
 
 class SdoWriter:
-    """An object that no RPDO carries: its values go by SDO, one at a time and in their order."""
+    """Writes an object that no RPDO carries by SDO, one value at a time and in order."""
 
     by_sdo = True  # it goes by SDO
 
@@ -108,20 +108,20 @@ class SdoWriter:
         self._address = (index, subindex)
         self._queue: deque[QueuedWrite] = deque()
         self._busy = False
-        self._last: Number | None = None  # that was requested
-        self._failed = False  # its transfer
-        self._failures = 0  # in a row
+        self._last: Number | None = None  # last requested value
+        self._failed = False  # the transfer of that value failed
+        self._failures = 0  # consecutive failures
         self._write_again_at = 0.0
 
     @property
     def limits(self) -> Limits:
-        """Smallest and largest value that the object holds, by its type in the EDS."""
+        """Smallest and largest value of the object, by its type in the EDS."""
         return self._objects.limits(*self._address)
 
     def write(self, value: Number) -> None:
-        """Hold a value in the device, cycle by cycle; each change of it is sent.
+        """Keep a value in the device, called each cycle; each change is sent.
 
-        What was lost is sent again at once, and what was refused ever less often.
+        A lost value is sent again at once, a refused one at increasing intervals.
         """
         if value == self._last and not self._is_due():
             return
@@ -129,7 +129,7 @@ class SdoWriter:
             self._enqueue(QueuedWrite(value, Promise()))
 
     def deliver(self, value: Number) -> Promise[None]:
-        """Send a value once, whatever the device has; of those that wait the newest counts.
+        """Send a value once, even if unchanged; a newer value replaces one still waiting.
 
         Returns:
             Done when the device has this value or a newer one; rejected with what the device, or
@@ -140,7 +140,7 @@ class SdoWriter:
         return written
 
     def forget(self) -> None:
-        """The device restarted: write again whatever comes."""
+        """Forget the last value, because the device restarted, so the next one is written."""
         while self._queue:
             self._queue.popleft().written.reject(self._offline())
         self._last = None
@@ -148,7 +148,7 @@ class SdoWriter:
         self._failures = 0
 
     def _is_due(self) -> bool:
-        """Whether the last value is to be sent again."""
+        """Whether the last value is due to be sent again."""
         return self._failed and not self._busy and self._scheduler.now >= self._write_again_at
 
     def _enqueue(self, entry: QueuedWrite) -> None:
@@ -181,7 +181,7 @@ class SdoWriter:
         await self._objects.write_object(*self._address, value)
 
     def _note_failure(self, error: Exception, *, repeats: bool) -> None:
-        """Report the first failure, and keep values from piling up behind those that follow."""
+        """Report the first failure, and keep values from queueing up behind further ones."""
         while len(self._queue) > 1:
             self._queue.popleft().written.follow(self._queue[-1].written)
         self._failed = not self._queue
@@ -208,7 +208,7 @@ Reader: TypeAlias = InputReader | BackgroundReader
 
 
 class RemoteObjects:
-    """A device as a set of objects."""
+    """The objects of a device, accessed by PDO or SDO."""
 
     def __init__(
         self,
@@ -241,7 +241,7 @@ class RemoteObjects:
             on_odd=partial(report, EventKind.SDO, Severity.WARNING),
         )
         self.sdo.on_download.append(self._object_downloaded)
-        self.report = report  # takes what goes wrong with an object
+        self.report = report  # reports errors of an object
         self._is_online = is_online
         self._scheduler = scheduler
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
@@ -253,7 +253,7 @@ class RemoteObjects:
         return self._is_online()
 
     def reader(self, index: int, subindex: int = 0) -> Reader:
-        """Return a reader for an object, by TPDO when it is mapped, else by polling."""
+        """Return a reader for an object: by TPDO if mapped, else by SDO polling."""
         mapped = self.image.reader(index, subindex)
         if mapped is not None:
             return mapped
@@ -262,7 +262,7 @@ class RemoteObjects:
         return self._polled.setdefault((index, subindex), reader)
 
     def writer(self, index: int, subindex: int = 0) -> Writer:
-        """Return a writer for an object, by RPDO when it is mapped, else by SDO."""
+        """Return a writer for an object: by RPDO if mapped, else by SDO."""
         mapped = self.image.writer(index, subindex)
         if mapped is not None:
             return mapped
@@ -271,7 +271,7 @@ class RemoteObjects:
         return writer
 
     async def poll(self, period: float) -> None:
-        """Keep the objects that no TPDO carries up to date while the device is online."""
+        """Poll the objects that no TPDO carries every ``period`` in [s] while online."""
         while self._polled and self.online:
             for address, entry in list(self._polled.items()):
                 try:
@@ -279,13 +279,13 @@ class RemoteObjects:
                 except (SdoError, CodecError):
                     if not self.online:
                         return
-                    continue  # the SDO counters show it; the value stays as old as it is
+                    continue  # the SDO counters show it; the value keeps its age
                 entry.value = value if isinstance(value, (int, float)) else None
                 entry.timestamp = self._scheduler.now
             await self._scheduler.timer(period)
 
     def note_value(self, index: int, subindex: int, data: bytes) -> None:
-        """Store the value of an object that was read elsewhere; of use where it is polled."""
+        """Store a value that was read elsewhere, if the object is polled."""
         entry = self._polled.get((index, subindex))
         listed = self.config.dictionary.get(index, subindex)
         if entry is None or listed is None:
@@ -309,7 +309,7 @@ class RemoteObjects:
         return entry
 
     def check_owner(self, index: int) -> None:
-        """Refuse to write what the driver of this device writes."""
+        """Refuse to write an object that the driver of this device writes."""
         if index in self.config.commanded_indices:
             raise DriveError(
                 f'{object_address(index)} of {self.name} is written by its driver in each cycle; '
@@ -317,12 +317,12 @@ class RemoteObjects:
             )
 
     def limits(self, index: int, subindex: int = 0) -> Limits:
-        """Return the smallest and largest value that an object holds, by its type in the EDS."""
+        """Return the smallest and largest value of an object, by its type in the EDS."""
         entry = self.config.dictionary.get(index, subindex)
         return (-math.inf, math.inf) if entry is None else limits_of(entry.data_type)
 
     async def read_digital_inputs(self) -> None:
-        """Read those by SDO whose TPDO may be silent, as it comes when one changes (CiA 401)."""
+        """Read digital inputs by SDO if their TPDO is sent only on change (CiA 401)."""
         await self._scheduler.timer(INPUTS_TIME)
         for entry in self.image.tpdos:
             mapping = entry.config.mapping
@@ -355,7 +355,7 @@ class RemoteObjects:
     ) -> Promise[None]:
         """Write an object by SDO, encoded by its type in the EDS; errors reject the promise.
 
-        An urgent one does not wait for other SDOs, as of :meth:`SdoClient.write`.
+        An urgent write does not wait for other SDOs, see :meth:`SdoClient.write`.
         """
         try:
             data = encode(self.entry(index, subindex).data_type, value)
@@ -369,9 +369,9 @@ class RemoteObjects:
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]
     ) -> None:
-        """An SDO is about to change an object: an RPDO that carries it must not change it back.
+        """Update RPDOs that carry an object an SDO is about to write, so as not to revert it.
 
-        The device may take the value long before its answer is here.
+        The device may take the value long before its answer arrives.
         """
         mapped = self.image.mapped_output(index, subindex)
         if mapped is None or index in self.config.commanded_indices:
@@ -386,17 +386,17 @@ class RemoteObjects:
         self.image.store(index, subindex, value)
 
         def set_back(end: Promise[None]) -> None:
-            unchanged = self.image.commanded(index, subindex) == value  # by whoever publishes
+            unchanged = self.image.commanded(index, subindex) == value  # not published since
             if end.error is not None and unchanged:
                 self.image.store(index, subindex, before)
 
         end.when_done(set_back)
 
     def check_output(self, index: int, subindex: int, value: Value) -> Number:
-        """Return a value for an RPDO; the device would not answer to one that it cannot hold.
+        """Return a value checked for an RPDO, as a device does not report one out of range.
 
         Raises:
-            CodecError: It is no number, or beyond the type or the limits of the EDS.
+            CodecError: It is not a number, or beyond the type or the limits of the EDS.
         """
         mapped = self.image.mapped_output(index, subindex)
         data_type = self.entry(index, subindex).data_type if mapped is None else mapped.data_type
@@ -459,7 +459,7 @@ class RemoteObjects:
         return entry, data
 
     def forget(self, reason: str) -> None:
-        """The device went away, or restarted: values that were sent or received are outdated."""
+        """Forget values sent or received, because the device restarted or is lost."""
         self.image.clear()
         self.sdo.cancel_all(reason)
         for entry in self._polled.values():

@@ -23,8 +23,8 @@ from .scheduler import Promise
 
 T = TypeVar('T')
 
-WINDOW = 2000  # cycles that the percentiles look back
-REPORTED_LATENESS = 0.1  # [s] lateness of a cycle that is worth a word
+WINDOW = 2000  # cycles over which percentiles are computed
+REPORTED_LATENESS = 0.1  # [s] smallest reported lateness of a cycle
 IDLE_SHARE = 0.5  # of a period, in which a bus that was silent until its end is not read again
 
 OWNER = 'the CANopen master'  # of the thread, for messages
@@ -34,12 +34,12 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class CycleFigures:
-    """What the cycle did; jitter over the last window, counts since the start."""
+    """Statistics of the cycle: jitter over the last window, counts since the start."""
 
     period: float  # nominal period in [s]
     cycles: int  # number of cycles
-    overruns: int  # cycles that were left out because the one before ended too late
-    jitter_p50: float  # median lateness of SYNC, when it has been handed to the bus, in [s]
+    overruns: int  # cycles skipped because the previous one ended too late
+    jitter_p50: float  # median lateness of SYNC when handed to the bus, in [s]
     jitter_p99: float  # 99th percentile of the lateness in [s]
     jitter_max: float  # largest lateness in [s]
 
@@ -48,7 +48,7 @@ class CycleStatistics:
     """Collects the lateness of each cycle against its deadline."""
 
     def __init__(self, period: float, window: int = WINDOW) -> None:
-        """The ``period`` is in [s]; the percentiles look back ``window`` cycles."""
+        """``period`` is in [s]; percentiles cover the last ``window`` cycles."""
         self._period = period
         self._late: deque[float] = deque(maxlen=window)
         self._cycles = 0
@@ -61,7 +61,7 @@ class CycleStatistics:
         self._overruns += skipped
 
     def figures(self) -> CycleFigures:
-        """Return the figures of now."""
+        """Return the current statistics."""
         ordered = sorted(self._late) or [0.0]
         last = len(ordered) - 1
         return CycleFigures(
@@ -76,7 +76,7 @@ class CycleStatistics:
 
 @dataclass(frozen=True)
 class Clock:
-    """The time of a master, and what its callers wait with; tests have a time of their own."""
+    """Clock of a master and waiting of its callers; tests replace it by simulated time."""
 
     now: Callable[[], float] = time.monotonic  # steady time in [s]
     # of what another thread hands over; None for one that waits in real time
@@ -84,21 +84,21 @@ class Clock:
 
 
 class NetworkThread(BusThread):
-    """Owns the cycle, and all reading and writing of the bus.
+    """Thread that runs the cycle and does all reading and writing of the bus.
 
-    Without a thread, :meth:`begin` and then :meth:`step`, again and again, do the same.
+    To run without a thread, call :meth:`begin` and then :meth:`step` repeatedly.
     """
 
     def __init__(self, bus: Bus, network: Network, clock: Clock | None = None) -> None:
-        """The bus is open, and stays the caller's to close."""
+        """``bus`` must be open; the caller closes it."""
         clock = clock or Clock()
         super().__init__(bus, 'canopen', self._serve, OWNER, clock.future)
         self.now = clock.now  # steady time in [s]
         self.network = network  # the network that it runs
         self.period = network.config.master.cycle_period  # length of the cycle in [s]
-        # defect that has ended it; None while it runs, and after a wanted end
+        # defect that ended the thread; None while it runs, and after a regular end
         self.failure: BusError | None = None
-        # called in the thread, for what can still be done; returns what was, in words
+        # called in the thread after a defect; returns in words what was still done
         self.on_defect: Callable[[], str] = lambda: ''
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
@@ -121,11 +121,11 @@ class NetworkThread(BusThread):
         return self.run_later(begin)
 
     def run_coroutine(self, make: Callable[[], Coroutine[Promise[Any], None, T]]) -> Future[T]:
-        """As :meth:`run`, for a coroutine that is made in the thread of the cycle."""
+        """Like :meth:`run`, for a coroutine that ``make`` creates in the thread of the cycle."""
         return self.run(lambda: self.network.scheduler.spawn(make()))
 
     def figures(self) -> CycleFigures:
-        """Return the figures of the cycle; call it in the thread of the cycle."""
+        """Return the statistics of the cycle; call it in the thread of the cycle."""
         return self._statistics.figures()
 
     def _defect(self, error: Exception) -> None:
@@ -137,18 +137,18 @@ class NetworkThread(BusThread):
         self.failure = BusError(text)
 
     def begin(self) -> None:
-        """Begin to boot the devices; the first cycle is due at once."""
+        """Start to boot the devices; the first cycle is due at once."""
         self.network.start(self.now())
         self._timer = CycleTimer(self.period, self.now())
 
     @property
     def next_due(self) -> float:
-        """When the next cycle, update or timer is due in [s]."""
+        """Time at which the next cycle, update or timer is due in [s]."""
         timer = self.network.scheduler.next_deadline() or math.inf
         return min(self._timer.deadline, timer, self.network.next_update)
 
     def step(self) -> None:
-        """Receive until something is due, and do that; SYNC comes before all else."""
+        """Receive until something is due, and process that; SYNC takes precedence."""
         now, idle = self.now(), False
         if now < self._timer.deadline:
             # TPDOs that answer SYNC act together, when the last has come
@@ -172,10 +172,10 @@ class NetworkThread(BusThread):
             self.step()
 
     def _begin_cycle(self, cycle: Cycle, now: float, frames: list[Frame]) -> None:
-        """Do what follows SYNC, with what has come before it taken first.
+        """Run the work after SYNC; process frames received before it first.
 
-        After a pause of this process, that is older than the time-outs that it would otherwise
-        seem to have missed.
+        After a pause of this process, such frames prevent time-outs that they would otherwise seem
+        to have missed.
         """
         self._cycle_time = cycle.time
         self._take([frame for frame in frames if frame.timestamp < now])
@@ -183,7 +183,7 @@ class NetworkThread(BusThread):
             self._log_defects(partial(self.network.note_pause, cycle.late, now))
         self._log_defects(partial(self.network.cycle, now, self.period))
         self._take([frame for frame in frames if frame.timestamp >= now])
-        self._update_when_due(now)  # the deadline may have passed before the next look
+        self._update_when_due(now)  # the deadline may pass before the next check
 
     def _update_when_due(self, now: float) -> None:
         if now >= self.network.next_update:
@@ -195,12 +195,12 @@ class NetworkThread(BusThread):
         for frame in frames:
             try:
                 receive(frame)
-            except Exception:  # noqa: PERF203  # one frame must not cost the next
+            except Exception:  # noqa: PERF203  # an error in one frame must not affect the next
                 logger.exception('a defect in the CANopen master, at the frame %s', frame)
         self.do_work()
 
     def _log_defects(self, work: Callable[[], object]) -> None:
-        """Contain a defect in one cycle, so that the drives stay under control."""
+        """Run ``work`` and log its exceptions, so that the drives stay under control."""
         try:
             work()
         except Exception:

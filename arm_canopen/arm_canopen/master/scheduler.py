@@ -18,7 +18,7 @@ T = TypeVar('T')
 
 
 class Promise(Generic[T]):
-    """A result that comes later, once; it can be awaited by coroutines of a scheduler."""
+    """A result that is set later, once; coroutines of a scheduler can await it."""
 
     def __init__(self) -> None:
         self.done = False
@@ -27,11 +27,11 @@ class Promise(Generic[T]):
         self._callbacks: list[Callable[[Promise[T]], None]] = []
 
     def resolve(self, value: T) -> None:
-        """Give the result; ignored when there is one already."""
+        """Set the result; ignored if there is one already."""
         self._finish(value, None)
 
     def reject(self, error: BaseException) -> None:
-        """Give an error as the result; ignored when there is one already."""
+        """Set an error as the result; ignored if there is one already."""
         self._finish(None, error)
 
     def follow(self, other: Promise[T]) -> None:
@@ -46,7 +46,7 @@ class Promise(Generic[T]):
         other.when_done(finish)
 
     def abandon(self) -> None:
-        """End without a result and without callbacks: no one waits any more."""
+        """End without a result or callbacks, as the result is not needed any more."""
         self.done = True
         self._callbacks.clear()
 
@@ -54,7 +54,7 @@ class Promise(Generic[T]):
         """Return the result or raise the error.
 
         Raises:
-            RuntimeError: There is none yet.
+            RuntimeError: There is no result yet.
         """
         if not self.done:
             raise RuntimeError('the promise is not done, it has no result yet')
@@ -64,11 +64,11 @@ class Promise(Generic[T]):
 
     @property
     def error(self) -> BaseException | None:
-        """The error that it was rejected with, if any."""
+        """Error with which it was rejected, if any."""
         return self._error
 
     def when_done(self, callback: Callable[[Promise[T]], None]) -> None:
-        """Call back when there is a result, at once if there is one already."""
+        """Call ``callback`` when there is a result, at once if there is one already."""
         if self.done:
             callback(self)
         else:
@@ -90,7 +90,7 @@ class Promise(Generic[T]):
 
 
 def completed() -> Promise[None]:
-    """Return the promise of something that is done already."""
+    """Return a promise that is already resolved."""
     promise: Promise[None] = Promise()
     promise.resolve(None)
     return promise
@@ -100,7 +100,7 @@ class Task(Promise[T]):
     """A running coroutine; its result is what the coroutine returns."""
 
     def __init__(self, coroutine: Coroutine[Promise[Any], None, T]) -> None:
-        """Run up to the first wait."""
+        """Run the coroutine up to its first wait."""
         super().__init__()
         self.cancelled = False  # it was ended from outside
         self._coroutine = coroutine
@@ -110,7 +110,7 @@ class Task(Promise[T]):
     def cancel(self, reason: BaseException) -> None:
         """End the coroutine where it waits; awaiting the task raises the reason.
 
-        One that is just running, and ends itself over some corner, ends at its next wait.
+        A coroutine that cancels itself while it runs ends at its next wait.
         """
         if self.done:
             return
@@ -150,7 +150,7 @@ class Scheduler:
         self._conditions: list[tuple[Callable[[], bool], Promise[None]]] = []
 
     def advance(self, now: float) -> None:
-        """Set the time and resume what waited for it, or for a condition that now holds."""
+        """Set the time; resume coroutines whose timer has expired or whose condition holds."""
         self.set_time(now)
         while self._timers and self._timers[0][0] <= self.now:
             heapq.heappop(self._timers)[2].resolve(None)
@@ -158,21 +158,21 @@ class Scheduler:
             self._check_conditions()
 
     def set_time(self, now: float) -> None:
-        """Set the time without resuming a task, so that what is begun now is timed from now."""
+        """Set the time without resuming tasks, so that new timers start from it."""
         self.now = max(self.now, now)
 
     def next_deadline(self) -> float | None:
-        """Return the time of the next timer in [s], None when there is none."""
+        """Return the time of the next timer in [s], None if there is none."""
         while self._timers and self._timers[0][2].done:
             heapq.heappop(self._timers)
         return self._timers[0][0] if self._timers else None
 
     def spawn(self, coroutine: Coroutine[Promise[Any], None, T]) -> Task[T]:
-        """Start a coroutine now; the caller awaits it or looks at its result."""
+        """Start a coroutine now; return its task, which the caller awaits or checks."""
         return Task(coroutine)
 
     def background(self, coroutine: Coroutine[Promise[Any], None, None]) -> Task[None]:
-        """Start a coroutine that is not awaited; an error in it is a defect and is reported."""
+        """Start a coroutine that is not awaited; an error in it is reported as a defect."""
         task = Task(coroutine)
         task.when_done(self._check_background)
         return task
@@ -187,7 +187,7 @@ class Scheduler:
         """Wait for a promise for at most a time in [s].
 
         Raises:
-            TimeoutError: There was no result in time.
+            TimeoutError: No result within ``timeout``.
         """
         first: Promise[None] = Promise()
         timer = self.timer(timeout)
@@ -202,7 +202,7 @@ class Scheduler:
         return promise.result()
 
     async def until(self, condition: Callable[[], bool], timeout: float) -> None:
-        """Wait until a condition holds; it is looked at whenever time advances.
+        """Wait until a condition holds; it is checked whenever time advances.
 
         Raises:
             TimeoutError: It did not hold within the time-out in [s].
@@ -219,14 +219,14 @@ class Scheduler:
                 self._conditions.remove(entry)
 
     async def gather(self, tasks: Sequence[Promise[T]]) -> list[T]:
-        """Wait for all; the first error in their order is raised after all are done."""
+        """Wait for all tasks; return their results, or raise the first error in their order."""
         for task in tasks:
             await self._end_of(task)
         return [task.result() for task in tasks]
 
     @staticmethod
     def _end_of(task: Promise[Any]) -> Promise[None]:
-        """Return a promise that is resolved when the task ends, well or not."""
+        """Return a promise that is resolved when the task ends, with or without an error."""
         end: Promise[None] = Promise()
         task.when_done(lambda _: end.resolve(None))
         return end

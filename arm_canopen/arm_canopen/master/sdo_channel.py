@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One question at a time to the SDO server of a device, and its answer (CiA 301, 7.2.4)."""
+"""SDO requests to the server of a device, one at a time, and their responses (CiA 301, 7.2.4)."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ REPEAT_AFTER = 0.25  # [s] before a request that may be repeated is sent again
 MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for sub in range(5)))
 """Objects that a device has or refuses (CiA 301, table 65); the answer shows where others end."""
 _ABORT = b'\x80'
-SECOND_ANSWER_TIME = 0.02  # [s] in which another device with the same node id answers, too
-OTHER_CLIENT_TIME = 1.0  # [s] in which the answers to another client are there
+SECOND_ANSWER_TIME = 0.02  # [s] in which another device with the same node id also answers
+OTHER_CLIENT_TIME = 1.0  # [s] in which answers to another client arrive
 REFUSED_PAUSE = 0.005  # [s] before a frame that the bus has refused is sent again
-PENDING_MAX = 16  # answers to remember that never came
+PENDING_MAX = 16  # outstanding answers to remember
 
 
 @dataclass(slots=True)
 class SdoCounters:
-    """What became of the transfers to one device."""
+    """Results of the transfers to one device."""
 
     done: int = 0
     aborted: int = 0
     timed_out: int = 0
     stale: int = 0  # answers that belong to no open request
-    doubled: int = 0  # of these: the answer to a request that was sent once, for a second time
+    doubled: int = 0  # of these: second answers to a request that was sent once
     repeated: int = 0  # requests that were sent again
 
 
 class SdoChannel:
-    """Sends questions to the SDO server of one device and finds their answers.
+    """Sends requests to the SDO server of one device and matches the answers.
 
-    An answer carries its object, and not the request that it belongs to. So answers that are
-    outstanding are remembered: before their object is read again, another one is read, and
-    since a server answers in order, what comes after that is new.
+    An answer names its object, but not its request. So the channel remembers outstanding answers:
+    before it reads their object again, it reads another one. As a server answers in order, later
+    answers are new.
     """
 
     def __init__(
@@ -61,8 +61,8 @@ class SdoChannel:
         send: Send,
         on_odd: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """``on_odd`` takes what is odd about the device, once each."""
-        self.counters = SdoCounters()  # what became of the transfers
+        """``on_odd`` is called once for each kind of odd behaviour of the device."""
+        self.counters = SdoCounters()  # results of the transfers
         self.address: Address = (0, 0)  # the object of the present transfer
         self._on_odd = on_odd
         self._odd: set[str] = set()
@@ -81,10 +81,10 @@ class SdoChannel:
     async def begin(
         self, index: int, subindex: int, timeout: float, *, settle: bool = True
     ) -> None:
-        """Begin a transfer; makes sure that no answer of an earlier one is taken for its own.
+        """Begin a transfer; exclude answers to earlier ones.
 
-        To ``settle`` it waits at most ``timeout`` in [s] for outstanding answers; else one to the
-        same question counts.
+        With ``settle`` it waits at most ``timeout`` in [s] for outstanding answers; otherwise one
+        to the same request counts.
 
         Raises:
             SdoTimeoutError: The device does not answer at all.
@@ -97,8 +97,8 @@ class SdoChannel:
     def receive(self, data: bytes) -> None:
         """Process a frame of the server.
 
-        What does not answer the open question is passed over: it is the late answer to one that
-        timed out, or meant for another client.
+        Frames that do not answer the open request are ignored: they are late answers, or meant for
+        another client.
         """
         if len(data) < sdo.FRAME_BYTES:
             self.note_odd(
@@ -128,11 +128,11 @@ class SdoChannel:
             self.counters.doubled += 1
 
     def note_other_client(self) -> None:
-        """Another client has sent a request; its answer is no second one to our own."""
+        """Record a request of another client, whose answer is not a second one to ours."""
         self._other_client_until = self._scheduler.now + OTHER_CLIENT_TIME
 
     def note_odd(self, kind: str, text: str) -> None:
-        """Report something odd about the device, once of each kind."""
+        """Report odd behaviour of the device, once for each kind."""
         if kind not in self._odd:
             self._odd.add(kind)
             self._on_odd(text)
@@ -147,17 +147,17 @@ class SdoChannel:
         self._send_abort(AbortCode.GENERAL)
 
     def restarted(self) -> None:
-        """The device has restarted: it owes no answer any more, and has no transfer to abort."""
+        """Handle a restart of the device: drop outstanding answers and the transfer."""
         self._restarted = True
         self._pending_replies = []
         self._answered_at.clear()
 
     def send(self, data: bytes) -> BusError | None:
-        """Send a frame that is not answered; return why the bus has not taken it."""
+        """Send a frame without an answer; return the error if the bus refuses it."""
         return self._send(Frame(self._request_id, data))
 
     async def deliver(self, data: bytes, timeout: float) -> BusError | None:
-        """Send a frame, again while the bus refuses it, for a time in [s]; return the refusal."""
+        """Send a frame, retry for ``timeout`` in [s] if the bus refuses it; return the error."""
         end = self._scheduler.now + timeout
         while (refusal := self.send(data)) is not None and self._scheduler.now < end:
             await self._scheduler.timer(min(REFUSED_PAUSE, end - self._scheduler.now))
@@ -168,8 +168,8 @@ class SdoChannel:
     ) -> T:
         """Send a request, and wait at most ``timeout`` in [s] for the answer that ``match`` reads.
 
-        Without a question it only waits. ``match`` returns None for what answers something else.
-        To ``repeat`` a request is sent twice when no answer comes.
+        Without ``question`` it only waits. ``match`` returns None for other answers. With
+        ``repeat`` the request is sent again if no answer arrives.
 
         Raises:
             SdoAbortError: The device refused.
@@ -218,7 +218,7 @@ class SdoChannel:
         raise SdoTimeoutError(self._silence(self.address, timeout))
 
     def refuse(self, code: AbortCode, detail: str = '') -> SdoAbortError:
-        """End the transfer, because of what the device sent; returns the error to raise."""
+        """Abort the transfer because of an invalid answer; return the error to raise."""
         self.counters.aborted += 1
         self._send_abort(code)
         return SdoAbortError(
@@ -228,7 +228,7 @@ class SdoChannel:
         )
 
     async def _settle(self, index: int, subindex: int, timeout: float) -> None:
-        """Flush outstanding answers by reading an object that none of them is of."""
+        """Flush outstanding answers by reading another object."""
         marker = next(
             (place for place in MARKERS if place not in self._pending_replies), MARKERS[0]
         )
@@ -276,7 +276,7 @@ class SdoChannel:
 
 
 def response(kind: type[Answer], address: Address) -> Match[Answer]:
-    """Return what reads an expedited or segmented answer of a kind, for an object."""
+    """Return a matcher for expedited or segmented answers of a kind for an object."""
 
     def match(data: bytes) -> Answer | None:
         try:
@@ -293,7 +293,7 @@ def response(kind: type[Answer], address: Address) -> Match[Answer]:
 
 
 def _ends_of_waits(timeout: float, *, repeat: bool) -> Iterator[float]:
-    """Divide the time-out into waits, one for each time of asking, each twice the last."""
+    """Yield the end of the wait after each request; each wait is twice the last."""
     wait = min(timeout / 2, REPEAT_AFTER)
     end = wait
     while repeat and timeout - end >= wait:  # no wait is shorter than the first one
@@ -304,7 +304,7 @@ def _ends_of_waits(timeout: float, *, repeat: bool) -> Iterator[float]:
 
 
 def _object_of(data: bytes) -> bytes:
-    """Return index and sub-index of an answer that names them, else nothing."""
+    """Return the bytes of index and sub-index in an answer, empty if it has none."""
     return data[1:4] if len(data) >= 4 and data[0] >> 5 in (2, 3, 4) else b''
 
 

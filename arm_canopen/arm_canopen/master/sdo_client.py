@@ -35,9 +35,9 @@ class SdoClient:
         dictionary: ObjectDictionary | None = None,
         on_odd: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """Without a dictionary an answer has as many bytes as came.
+        """Without ``dictionary`` values are not cut to the size of their type.
 
-        Other arguments are as of :class:`SdoChannel`.
+        For the other arguments see :class:`SdoChannel`.
         """
         self.node_id = node_id  # the device
         # called when the request of a download leaves, with index, sub-index, data and the promise
@@ -49,28 +49,28 @@ class SdoClient:
         self._channel = SdoChannel(node_id, name, scheduler, send, on_odd)
         self._queue: deque[_Queued] = deque()
         self._urgent: deque[_Queued] = deque()
-        self._yields = False  # the transfer that runs ends for an urgent one
-        self._made_way = False  # it has done so
+        self._yields = False  # the running transfer is being ended for an urgent one
+        self._made_way = False  # the running transfer has ended for it
         self._busy = False
         self._running: Task[Any] | None = None
-        self._has_blocks = True  # as long as the device has not shown the contrary
+        self._has_blocks = True  # until a block transfer fails
 
     @property
     def counters(self) -> SdoCounters:
-        """What became of the transfers."""
+        """Results of the transfers."""
         return self._channel.counters
 
     def read(
         self, index: int, subindex: int, timeout: float, *, block: bool = False
     ) -> Promise[bytes]:
-        """Queue an upload.
+        """Queue the upload of an object.
 
         Args:
             index: Object index.
             subindex: Sub-index.
             timeout: Longest time for each answer of the device in [s]; the first question is
                 repeated within it.
-            block: The value may be long, so it is read in blocks when the device can do that.
+            block: Use a block transfer if the device supports it, for long values.
 
         Returns:
             Promise of the bytes; rejected with SdoAbortError or SdoTimeoutError.
@@ -95,11 +95,11 @@ class SdoClient:
         Args:
             index: Object index.
             subindex: Sub-index.
-            data: The value as it is sent.
+            data: The encoded value.
             timeout: Longest time for each answer of the device in [s].
-            repeat: Writing the value twice does no harm, so a lost frame may be sent again.
-            urgent: It leaves at once, and ends the transfer that runs unless that is urgent, too:
-                an upload begins again after it, a download fails. An outstanding answer for the
+            repeat: Writing twice is harmless, so a request may be repeated after a loss.
+            urgent: Start at once and end the running transfer, unless that is also urgent: an
+                upload is restarted afterwards, a download fails. An outstanding answer for the
                 object counts as its own.
 
         Returns:
@@ -122,9 +122,9 @@ class SdoClient:
         return promise
 
     def cancel_all(self, reason: str) -> None:
-        """Reject every transfer that is not urgent, because the device restarted or went away.
+        """Reject every transfer that is not urgent, because the device restarted or is lost.
 
-        An urgent one stops it, and it may receive what it does not answer.
+        Urgent ones stop the device, which may still receive frames without answering.
         """
         queue = [*self._queue]
         self._queue.clear()
@@ -134,7 +134,7 @@ class SdoClient:
             entry.promise.reject(SdoError(f'{self._name}: {reason}'))
 
     def restarted(self) -> None:
-        """The device has restarted; requests from now on are answered anew."""
+        """Handle a restart of the device: no earlier request is answered any more."""
         self._channel.restarted()
 
     def receive(self, frame: Frame) -> None:
@@ -142,11 +142,11 @@ class SdoClient:
         self._channel.receive(frame.data)
 
     def receive_request(self, _frame: Frame) -> None:
-        """Another client of this bus has sent a request to the device."""
+        """Handle a request of another client on this bus to the device."""
         self._channel.note_other_client()
 
     def _end_running(self, reason: str) -> None:
-        """End the transfer that runs; the next one begins before this returns."""
+        """End the running transfer; the next one begins before this returns."""
         if self._running is not None:
             self._channel.cancel()
             self._running.cancel(SdoError(f'{self._name}: {reason}'))
@@ -197,7 +197,7 @@ class SdoClient:
         return data
 
     def _fitted(self, data: bytes, size: int | None) -> bytes:
-        """Cut the value of an expedited answer to its type, and note a size that is too large."""
+        """Cut the value of an expedited answer to its type; report a size that is too large."""
         address = self._channel.address
         entry = self._dictionary.get(*address) if self._dictionary is not None else None
         if entry is None:
@@ -213,7 +213,7 @@ class SdoClient:
         return value
 
     def _give_up_blocks(self, failure: SdoError | None) -> None:
-        """Use segments from now on, after they did what a block transfer failed to do."""
+        """Use segments from now on, after they succeeded where a block transfer failed."""
         if failure is not None:
             self._has_blocks = False
             self._channel.note_odd(
@@ -285,20 +285,20 @@ class SdoClient:
             toggle = not toggle
 
 
-BURST = 8  # segments that are sent at once
-BURST_PAUSE = 0.001  # [s] between two bursts, in which the frames of the cycle find their way
-FRUITLESS_MAX = 5  # blocks of which nothing arrives before the transfer is given up
+BURST = 8  # segments sent at once
+BURST_PAUSE = 0.001  # [s] between two bursts, for the frames of the cycle
+FRUITLESS_MAX = 5  # lost blocks before the transfer is given up
 
 
 async def write_blocks(
     channel: SdoChannel, scheduler: Scheduler, data: bytes, timeout: float
 ) -> None:
-    """Write the object of the transfer that has begun.
+    """Download ``data`` to the object of the current transfer, in blocks.
 
     Raises:
         SdoAbortError: The device refused, or answered something that makes no sense.
         SdoTimeoutError: It did not answer, and does not have the value.
-        SdoError: It did not answer the end, so it may have the value.
+        SdoError: It did not confirm the end, so it may have the value.
     """
     question = struct.pack(
         '<BHBI', sdo.DOWNLOAD_INITIATE | sdo.CRC_BIT | sdo.SIZE_BIT, *channel.address, len(data)
@@ -328,7 +328,7 @@ async def write_blocks(
 
 
 async def read_blocks(channel: SdoChannel, timeout: float, size_max: int) -> bytes:
-    """Read the object of the transfer that has begun.
+    """Upload the object of the current transfer in blocks.
 
     Each frame of the device may take the ``timeout`` in [s]; more than ``size_max`` in [byte] is
     refused.
@@ -391,7 +391,7 @@ def _command(command: int, *, mask: int = 0xFF) -> Match[bytes]:
 
 
 def _addressed(channel: SdoChannel, command: int) -> Match[bytes]:
-    """Return what reads the answer to an initiation; its bits show what the server supports."""
+    """Return a matcher for the response to an initiate request."""
 
     def match(data: bytes) -> bytes | None:
         if len(data) != 8 or data[0] & ~(sdo.CRC_BIT | sdo.SIZE_BIT) != command:
@@ -405,13 +405,13 @@ T = TypeVar('T')
 Transfer: TypeAlias = Callable[[], Coroutine[Promise[Any], None, T]]
 DownloadHook: TypeAlias = Callable[[int, int, bytes, Promise[None]], None]
 
-BLOCK_MIN = 256  # [byte] from which on a value is written in blocks
+BLOCK_MIN = 256  # [byte] smallest value that is written in blocks
 SIZE_MAX = 16 << 20  # [byte] that a device may announce
 UNANNOUNCED_MAX = 1 << 20  # [byte] that it may send without having announced a length
 
 
 class _Queued(NamedTuple):
-    """A transfer that waits, the promise of its end, and whether it may begin twice."""
+    """A queued transfer, the promise of its end, and whether it may be restarted."""
 
     transfer: Transfer[Any]
     promise: Promise[Any]

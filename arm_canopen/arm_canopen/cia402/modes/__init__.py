@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The modes of operation, one file each; those that the objects of a drive and its RPDOs allow."""
+"""Modes of operation; :func:`build_modes` builds those that objects and RPDOs of a drive allow."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ __all__ = [
 
 
 def build_modes(view: AxisState, warn: Callable[[str], None]) -> dict[int, Mode]:
-    """Return the modes of a drive by their number in 0x6060."""
+    """Return the usable modes of a drive by their number in 0x6060."""
     modes = [NoMode(), Homing(), *_profile_modes(view, warn), *_cyclic_modes(view)]
     return {mode.number: mode for mode in modes}
 
 
 def _profile_modes(view: AxisState, warn: Callable[[str], None]) -> Iterator[Mode]:
-    """Yield the modes whose targets are single values, which may go by SDO."""
+    """Yield the modes with single targets, which may go by SDO."""
     node, units = view.node, view.units
 
     def writer(mode: OperationMode) -> Writer | None:
-        """Return a writer of the target of a mode, by SDO where no PDO carries it."""
+        """Return a writer for the target of a mode, using SDO if no PDO carries it."""
         index, subindex = TARGET_OBJECTS[mode]
         entry = node.config.dictionary.get(view.at(index), subindex)
         writer = node.objects.writer(view.at(index), subindex)
         return None if writer.by_sdo and (entry is None or not entry.access.writable) else writer
 
     def target(mode: OperationMode, cyclic: OperationMode) -> OffsetTarget | None:
-        """Return the target of a mode, which a cyclic mode adds an offset to until it is left."""
+        """Return the target of a mode; it subtracts the offset while the cyclic mode is active."""
         offset = OFFSET_OBJECTS[cyclic]
         if (of_mode := writer(mode)) is None:
             return None
@@ -68,7 +68,7 @@ def _profile_modes(view: AxisState, warn: Callable[[str], None]) -> Iterator[Mod
 
 
 def _cyclic_modes(view: AxisState) -> Iterator[Mode]:
-    """Yield the modes with a target in each cycle, which only an RPDO can carry."""
+    """Yield the modes with a target in each cycle, which require an RPDO."""
     units, image = view.units, view.node.image
 
     def target(mode: OperationMode) -> OffsetTarget | None:

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modes that command a position each cycle: 7 (interpolated) and 8 (cyclic synchronous).
 
-Targets are approached by a trapezoidal profile, one step a cycle: a single one as fast as the
-limits allow. Those of a stream are points of a path, and come at times of their own: the profile
-follows a line between them, so that its speed is that of the path and not that of a dash to each
-point. A set-point that can always stop at the end of the line goes beyond none of the targets.
+A trapezoidal profile approaches the target, one step per cycle. It moves to a single target as
+fast as the limits allow. Streamed targets are points of a path and arrive at irregular times: the
+profile follows a line between them, at the speed of the path instead of rushing to each point.
+The set-point can always stop at the end of the line, so it overshoots no target.
 
-:class:`FollowingWatch` judges by its own positions whether the axis goes where they lead it.
+:class:`FollowingWatch` compares the positions of the axis with its set-points.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from ..state import Actual
 from ..units import Units
 from .mode import Mode, NO_BITS
 
-SPREAD = 2.0  # intervals between targets over which the way to the newest one is spread
-LEARNING = 0.25  # share of the newest interval in their mean
+SPREAD = 2.0  # time to reach the newest target, in mean intervals between targets
+LEARNING = 0.25  # weight of the newest interval in the mean interval
 
 
 class TargetLine:
-    """Goes to the newest of a stream of targets at a constant rate.
+    """Interpolates linearly to the newest of a stream of targets.
 
-    It takes twice the usual interval between them for that, so that it does not rest when one is
+    It takes twice the mean interval between targets, so that it does not stop when one is
     late.
 
     Attributes:
-        position: Where it is.
+        position: Current position.
         target: The newest target.
     """
 
     def __init__(self, target: float) -> None:
         self.position = self.target = target
-        self._left = self._since = 0.0  # [s] to the newest target, and since it came
+        self._left = self._since = 0.0  # [s] left to the newest target, and since its arrival
         self._interval: float | None = None  # [s]
 
     def extend(self, target: float) -> None:
@@ -55,7 +55,7 @@ class TargetLine:
         self.target = target
 
     def step(self, period: float) -> float:
-        """Advance by a cycle of that length in [s], and return the new position."""
+        """Advance by a ``period`` in [s], and return the new position."""
         if self._left > period:
             self.position += period / self._left * (self.target - self.position)
         else:
@@ -69,35 +69,35 @@ class SetpointProfile:
     """Moves a set-point to a target that may change at any time, without a step in velocity."""
 
     def __init__(self, position: float, velocity: float = 0.0) -> None:
-        """Start at a position with a rate in [unit/s], and brake."""
+        """Start at a position and velocity in [unit/s], and brake to a stop."""
         self.position = position  # set-point of this cycle
-        self.velocity = velocity  # its rate in [unit/s]
-        self.target: float | None = None  # where it goes; None brakes to a stop
+        self.velocity = velocity  # rate of the set-point in [unit/s]
+        self.target: float | None = None  # end of the motion; None brakes to a stop
         self._line: TargetLine | None = None
 
     @property
     def at_rest(self) -> bool:
-        """Whether the set-point stands still and has nowhere to go."""
+        """Whether the set-point stands still and has no target."""
         return self.velocity == 0.0 and self.target in (None, self.position)
 
     @property
     def is_idle(self) -> bool:
-        """Whether a step changes nothing: it is at rest, and follows no stream of targets."""
+        """Whether it is at rest and follows no stream of targets, so that a step has no effect."""
         return self._line is None and self.at_rest
 
     def go(self, target: float | None) -> None:
-        """Go to a single target; without one brake to a stop."""
+        """Move to a single target; brake to a stop if it is None."""
         self.target, self._line = target, None
 
     def track(self, target: float) -> None:
-        """Go on to the next target of a stream; the first one is like a single target."""
+        """Move to the next target of a stream; the first one is handled like a single target."""
         if self._line is None:
             self._line, self.target = TargetLine(target), target
         else:
             self._line.extend(target)
 
     def follow(self, position: float, period: float) -> None:
-        """Follow the set-point of a stream, and remember its rate for a smooth stop."""
+        """Adopt the set-point of a motion source, and store its rate for a smooth stop."""
         self.velocity = (position - self.position) / period
         self.position = position
         self.go(None)
@@ -105,7 +105,7 @@ class SetpointProfile:
     def step(self, period: float, limits: ProfileLimits) -> float:
         """Advance by a cycle.
 
-        The speed is never above the one from which the target can still be met by braking: of
+        The speed is limited so that braking can still end at the target: of
         ``v * period + v^2 / (2 * deceleration) = distance`` the positive root.
 
         Returns:
@@ -139,14 +139,14 @@ class SetpointProfile:
         distance = target - self.position
         root = math.sqrt(period**2 + 2.0 * abs(distance) / deceleration)
         speed = min(speed_limit, deceleration * (root - period))
-        # on the last cycle the rest of the way is taken in one step
+        # the last cycle covers the remaining distance in one step
         if abs(distance) <= speed * period:
             speed = abs(distance) / period
         return math.copysign(speed, distance)
 
 
 class CyclicPosition(Mode):
-    """Mode 8: a set-point each cycle, of a motion source or from a profile towards targets."""
+    """Mode 8: a set-point each cycle, from a motion source or a profile towards a target."""
 
     number = OperationMode.CYCLIC_POSITION
     halts_by_bit = False
@@ -159,8 +159,8 @@ class CyclicPosition(Mode):
         self._limits = limits
         self._profile = SetpointProfile(0.0)
         self._streamed: tuple[float, int] | None = None  # position, the same in [inc]
-        self._position_inc = 0  # that was written last
-        self._stands = False  # the set-point is that one
+        self._position_inc = 0  # last value written
+        self._stands = False  # the set-point equals that value
 
     @property
     def setpoint(self) -> float:  # type: ignore[override]  # never none, and never written
@@ -174,7 +174,7 @@ class CyclicPosition(Mode):
 
     @property
     def goes_to_single_target(self) -> bool:
-        """Whether the profile is on the way to a single target."""
+        """Whether the profile is moving to a single target."""
         return self._profile.target is not None and not self._profile.at_rest
 
     def reached(self, statusword: int) -> bool:
@@ -189,25 +189,25 @@ class CyclicPosition(Mode):
         return self._target.deliver(actual.position_inc)
 
     def set_target(self, target: float) -> Promise[None]:
-        """Go to a single target by a profile."""
+        """Move to a single target by a profile."""
         self._scale.to_device(target, self._target.limits)  # else it would fail on arrival
         self._profile.go(target)
         return IN_THE_IMAGE
 
     def follow_target(self, target: float) -> Promise[None]:
-        """Go to the next target of a stream by a profile that is as even as they come."""
+        """Move to the next target of a stream, at the speed of the stream."""
         self._scale.to_device(target, self._target.limits)
         self._profile.track(target)
         return IN_THE_IMAGE
 
     def brake(self) -> None:
-        """Come to a stop within the limits, wherever that is."""
+        """Brake to a stop within the limits, at any position."""
         self._streamed = None
         self._profile.go(None)
 
     @property
     def braked(self) -> bool:
-        """Whether the set-point stands."""
+        """Whether the set-point stands still."""
         return self._profile.velocity == 0.0
 
     def stream(self, setpoint: float) -> None:
@@ -219,7 +219,7 @@ class CyclicPosition(Mode):
         self._streamed = setpoint, self._scale.to_device(setpoint, self._target.limits)
 
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Write the streamed set-point, or the profile's; a stream that ends is braked."""
+        """Write the set-point of the stream or the profile; brake when a stream ends."""
         profile = self._profile
         if self._streamed is not None:
             position, self._position_inc = self._streamed
@@ -233,18 +233,18 @@ class CyclicPosition(Mode):
 
 
 class InterpolatedPosition(CyclicPosition):
-    """Mode 7: as mode 8, into 0x60C1:1, with bit 4 enabling the interpolation."""
+    """Mode 7: like mode 8, but writes 0x60C1:1, and bit 4 enables the interpolation."""
 
     number = OperationMode.INTERPOLATED_POSITION
     bits = int(Controlword.ENABLE_INTERPOLATION)
 
 
 class FeedForward:
-    """What a drive adds in mode 8 to its own control: velocity 0x60B1, torque 0x60B2.
+    """Feed-forward of mode 8: velocity offset 0x60B1 and torque offset 0x60B2.
 
-    As far as RPDOs carry them (CiA 402-2, clause 13). In the modes 9 and 10 a drive adds them to
-    the target, so none may be left over from a stream. An offset that no stream has set is left as
-    it is: another program may have written it.
+    Only offsets that RPDOs carry are used (CiA 402-2, clause 13). In modes 9 and 10 a drive adds
+    them to the target, so they are reset after a stream. An offset that no stream has set stays
+    unchanged: another program may have written it.
     """
 
     def __init__(self, velocity: Writer | None, torque: Writer | None, units: Units) -> None:
@@ -253,7 +253,7 @@ class FeedForward:
         self._acts = False
 
     def follow(self, setpoint: Setpoint) -> None:
-        """Write what belongs to a set-point.
+        """Write the offsets of a set-point.
 
         Raises:
             DriveError: A value is not finite or does not fit its object; nothing is written.
@@ -282,15 +282,15 @@ class FeedForward:
             self._torque.write(torque_dev)
 
 
-FOLLOWING_WINDOW = 0.5  # [s] of set-points among which the position has to be
-MARGIN_TIME = 0.1  # [s] of the profile velocity by which it may be beside them
-LASTING_ERROR_TIME = 1.0  # [s] of a following error after which the axis is taken out of operation
-MOVED_SHARE = 0.1  # share of the margin by which set-points have to move to count as a motion
-FOLLOWED_SHARE = 0.5  # share of the motion of the set-points that an axis makes at least
+FOLLOWING_WINDOW = 0.5  # [s] of set-points with which the position is compared
+MARGIN_TIME = 0.1  # [s] times the profile velocity is the allowed deviation from them
+LASTING_ERROR_TIME = 1.0  # [s] of a following error after which the axis is disabled
+MOVED_SHARE = 0.1  # smallest change of set-points that is a motion, as share of the margin
+FOLLOWED_SHARE = 0.5  # smallest share of the motion that a following axis makes
 
 
 class Following(Enum):
-    """What the positions of the last half second show."""
+    """Result of comparing the positions of the last half second with the set-points."""
 
     FOLLOWS = 'it follows'
     UNDECIDED = 'it is seen again, where it was before'
@@ -301,35 +301,35 @@ class Following(Enum):
 class FollowingWatch:
     """Compares the position of an axis with the set-points of the last half second.
 
-    A drive that has lost its RPDOs goes on to report that it follows: it compares itself with the
-    last set-point that reached it. Its position is then left behind by the set-points, and would
-    jump to them when the RPDOs arrive again. An axis that a load pulls away from set-points that
-    stand is another matter: a new set-point where it is would let the load pull it further.
+    A drive that receives no RPDOs still reports that it follows, as it compares its position with
+    the last set-point received. Its position then stays behind the set-points, and would jump to
+    them when RPDOs arrive again. An axis that a load pulls away from constant set-points is
+    treated differently: a set-point at its position would let the load pull it further.
     """
 
     def __init__(self) -> None:
         self._samples: deque[tuple[float, float, float]] = deque()
         self._beside_since: float | None = None
-        self._unseen_from: float | None = None  # set-point when the axis was seen last
-        self._received = 0  # positions, in the cycle in which it was seen again
+        self._unseen_from: float | None = None  # set-point at the last fresh position
+        self._received = 0  # positions received when feedback resumed
 
     def clear(self) -> None:
-        """Forget the set-points: the axis is not led by them any more."""
+        """Forget the set-points: the axis no longer follows them."""
         self._samples.clear()
         self._beside_since = self._unseen_from = None
 
     def lose_sight(self) -> None:
-        """The axis is led on, but its positions are too old to be judged.
+        """Suspend the comparison: the axis is still commanded, but its positions are too old.
 
-        The first that comes again may be old, too. Where frames were lost, the axis stands there,
-        and the set-point that is due would make it jump. Where they were late, several positions
-        come in a cycle: the axis is led on, and a set-point at the first would make it jump back.
-        Thus none leaves in the first cycle.
+        The first position received afterwards may be old, too. If frames were lost, the axis
+        stands there, and the current set-point would make it jump. If they were late, several
+        positions arrive per cycle: the axis has moved on, and a set-point at the first would make
+        it jump back. Therefore no set-point is sent in the first cycle.
         """
         if self._samples:
-            unseen_from = self._unseen_from  # of a sight that was too short to judge
+            unseen_from = self._unseen_from  # kept if feedback was too short to judge
             if unseen_from is None:
-                unseen_from = self._samples[0][1]  # positions are too old after some time only
+                unseen_from = self._samples[0][1]  # positions become too old only after some time
             self.clear()
             self._unseen_from = unseen_from
 
@@ -344,17 +344,17 @@ class FollowingWatch:
         error: bool,
         received: int,
     ) -> Following:
-        """Judge by set-point and position of this cycle whether the axis follows.
+        """Add set-point and position of this cycle; return whether the axis follows.
 
         Args:
             now: Steady time in [s].
-            setpoint: Position commanded last in user units.
+            setpoint: Last commanded position in user units.
             position: Actual position in user units.
-            margin: How far an axis that has stopped to move may be beside its set-points in user
+            margin: Allowed deviation of an axis that has stopped from its set-points in user
                 units.
-            window: How far one that moves, or is pulled by a load, may lastingly be beside them
-                in user units; not below the margin.
-            error: The drive itself shows a following error.
+            window: Allowed lasting deviation of an axis that moves, or that a load pulls, in user
+                units; not below the margin.
+            error: The drive reports a following error.
             received: Number of positions received from the axis so far.
         """
         samples = self._samples

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an operation mode is to the master (CiA 402-2, clauses 10 to 16), and its targets.
+"""Base class of the modes of operation (CiA 402-2, clauses 10 to 16), and checks of targets.
 
 A mode writes its target object and returns its bits of the controlword. Every mode is
 preloaded with the actual value before the drive is enabled or the mode switched, so that nothing
 moves before a command.
 
-A target that the drive would not go to is refused, not clamped there: :func:`check_target` refuses
-what is beyond a limit or without effect; :meth:`.Scale.to_device` what an object cannot hold.
+Unreachable targets are refused, not clamped: :func:`check_target` refuses targets beyond a limit
+or without effect, :meth:`.Scale.to_device` those that do not fit the object.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from ..state import Actual
 from ..units import Units
 
 TARGET_REACHED = int(Statusword.TARGET_REACHED)
-NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
+NO_BITS = 0  # plain integers in the cycle, as IntFlag operators are too slow
 
 
 class OffsetTarget:
-    """A target object that is written less its offset, so that the drive does what is commanded.
+    """A target object written as target minus offset, as the drive adds the offset again.
 
-    The offset counts as it is when a target is preloaded: one that is written while the drive is
-    enabled moves the axis by itself, as the author of the driver intends.
+    The offset is read when a target is preloaded: an offset that is written while the drive is
+    enabled moves the axis, as its author intends.
     """
 
     def __init__(self, target: Writer, offset: Callable[[], int]) -> None:
-        """``offset`` returns what the offset object holds in device units."""
+        """``offset`` returns the value of the offset object in device units."""
         self.by_sdo = target.by_sdo
         self._target = target
         self._read = offset
@@ -62,27 +62,27 @@ class OffsetTarget:
         self._target.write(value - self._offset)
 
     def deliver(self, value: float) -> Promise[None]:
-        """Command the value that holds the drive, with the offset that it has now."""
+        """Command the holding value, using the current offset."""
         self._offset = self._read()
         return self._target.deliver(value - self._offset)
 
 
 class Mode(ABC):
-    """One operation mode of one drive."""
+    """One mode of operation of one drive."""
 
     number: OperationMode  # its value in 0x6060
-    halts_by_bit = True  # bit 8 of the controlword stops it; else the master brakes its set-points
-    cyclic = False  # its target acts on the drive in each cycle
+    halts_by_bit = True  # bit 8 of the controlword halts it; else the master ramps set-points
+    cyclic = False  # the drive follows its target in each cycle
     by_sdo = False  # its target goes by SDO, because no RPDO carries it
-    # position commanded last in user units; None in a mode that commands none
+    # last commanded position in user units; None if the mode commands no position
     setpoint: float | None = None
 
     @abstractmethod
     def preload(self, actual: Actual) -> Promise[None]:
-        """Forget any target and command what holds the drive where it is.
+        """Discard any target and command the value that holds the drive in place.
 
         Returns:
-            Done when the drive has it; whatever stood in its target object before acts no more.
+            Done when the drive has it; an earlier value of the target object has no effect then.
         """
 
     @abstractmethod
@@ -90,35 +90,35 @@ class Mode(ABC):
         """Accept a single target in user units.
 
         Returns:
-            Done when the drive has it; rejected when it has refused it, or was stopped before.
+            Done when the drive has it; rejected if the drive refuses it or is stopped before.
 
         Raises:
             DriveError: The mode has no target, or the value does not fit.
         """
 
     def follow_target(self, target: float) -> Promise[None]:
-        """Accept one of a stream of targets; :meth:`set_target` where the drive itself leads."""
+        """Accept a target of a stream; like :meth:`set_target` if the drive makes the profile."""
         return self.set_target(target)
 
     @abstractmethod
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Advance a cycle in which the drive accepts targets; return the bits of this mode."""
+        """Advance by a cycle in which the drive accepts targets; return the controlword bits."""
 
     def brake(self) -> None:  # noqa: B027  # most modes leave it to the drive
-        """Come to rest by own means, for a halt, a switch or the end of a stream."""
+        """Ramp the set-points to rest for a halt, a mode switch or the end of a stream."""
 
     @property
     def braked(self) -> bool:
-        """Whether what the mode commands stands still, as far as the mode itself leads it."""
+        """Whether the set-points stand still; True if the drive makes the profile."""
         return True
 
     def reached(self, statusword: int) -> bool:
-        """Whether the drive is where the last target is, as far as the mode knows."""
+        """Whether the drive has reached the last target, as far as the mode can determine."""
         return bool(statusword & TARGET_REACHED)
 
     @property
     def taken(self) -> bool:
-        """Whether the drive has a target that was commanded after the last brake."""
+        """Whether the drive has a target commanded after the last :meth:`brake`."""
         return True
 
 
@@ -162,9 +162,9 @@ class Homing(Mode):
         return Controlword.HOMING_START if self.started else NO_BITS
 
 
-NEGLIGIBLE = 2e-3  # share of the profile velocity that may become 0, as in a stream that fades
+NEGLIGIBLE = 2e-3  # share of the profile velocity that may round to 0, as at the end of a stream
 NEGLIGIBLE_EFFORT = 1e-3  # [unit of effort] likewise
-RANGE_SHARE = 1e-3  # share of the range (0x607D) that rounding to whole increments may cost
+RANGE_SHARE = 1e-3  # largest rounding error to whole increments, as share of the range (0x607D)
 
 
 def check_target(
@@ -176,7 +176,7 @@ def check_target(
     *,
     position: float = math.nan,
 ) -> None:
-    """Refuse a target that the drive would not go to: beyond its limits, or without any effect."""
+    """Refuse a target beyond the limits of the drive, or one without any effect."""
     if mode.setpoint is not None:
         _check_position(name, parameters.position_limits, target, position)
         _check_rounding(name, units, target, parameters.position_limits)
@@ -202,14 +202,14 @@ def check_target(
 
 
 def check_setpoint(name: str, mode: Mode, parameters: DriveParameters, setpoint: Setpoint) -> None:
-    """Refuse a set-point of a motion source beyond limits; errors as for targets.
+    """Refuse a set-point of a motion source beyond limits; raises as for targets.
 
-    A path leads between increments everywhere, and is off by half of one at most.
+    Rounding is not checked: along a path it is half an increment at most.
     """
     before = math.nan if mode.setpoint is None else mode.setpoint
     _check_position(name, parameters.position_limits, setpoint.position, before)
     if mode.number is not OperationMode.CYCLIC_POSITION:
-        return  # which has no feed-forward
+        return  # the other modes have no feed-forward
     _check_size(name, parameters.speed_limit, setpoint.velocity, 'velocity {:g} (0x607F)')
     _check_size(name, parameters.effort_limit, setpoint.effort, 'torque {:g} (0x6072)')
 
@@ -217,7 +217,7 @@ def check_setpoint(name: str, mode: Mode, parameters: DriveParameters, setpoint:
 def _check_position(
     name: str, limits: tuple[float, float] | None, target: float, start: float
 ) -> None:
-    """Refuse a position beyond the limits, unless it is on the way back from beyond them."""
+    """Refuse a position beyond the limits, unless it leads back towards them."""
     if limits is None or limits[0] <= target <= limits[1]:
         return
     if limits[1] < target <= start or start <= target < limits[0]:
@@ -231,7 +231,7 @@ def _check_position(
 def _check_rounding(
     name: str, units: Units, target: float, limits: tuple[float, float] | None
 ) -> None:
-    """Refuse a position that whole increments miss by more than the tolerance."""
+    """Refuse a position that rounding to whole increments changes beyond the tolerance."""
     increments, tolerance = units.position.raw(target), POSITION_TOLERANCE
     nearest = target
     if math.isfinite(increments):
@@ -246,7 +246,7 @@ def _check_rounding(
 
 
 def _check_effect(name: str, scaled: float, target: float, key: str, negligible: float) -> None:
-    """Refuse a velocity or torque that is none and would become 0."""
+    """Refuse a nonzero velocity or torque that rounds to 0."""
     if abs(target) > negligible and math.isfinite(scaled) and round(scaled) == 0:
         raise DriveError(
             f'{name}: target {target:g} is {scaled:g} device units, of which the object has whole '

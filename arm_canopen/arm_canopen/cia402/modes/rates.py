@@ -23,7 +23,7 @@ VL_RAMP = 0x70
 
 
 class DriveRamped(Mode):
-    """A value that the drive itself ramps to."""
+    """Base of the modes in which the drive ramps to the target."""
 
     bits = NO_BITS
 
@@ -35,7 +35,7 @@ class DriveRamped(Mode):
 
     @property
     def taken(self) -> bool:
-        """Whether the drive has the value that was commanded last."""
+        """Whether the drive has the last commanded value."""
         return self._delivery.done and self._delivery.error is None
 
     def set_target(self, target: float) -> Promise[None]:
@@ -47,7 +47,7 @@ class DriveRamped(Mode):
         self._deliver(0)
 
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Do nothing: the drive leads."""
+        """Do nothing: the drive makes the ramp."""
         return self.bits
 
     def _deliver(self, value: int) -> Promise[None]:
@@ -66,7 +66,7 @@ class ProfileVelocity(DriveRamped):
 
 
 class Velocity(ProfileVelocity):
-    """Mode 2, of frequency converters: velocity 0x6042, which has 16 bits."""
+    """Mode 2 of frequency converters: velocity in 0x6042, an INTEGER16."""
 
     number = OperationMode.VELOCITY
     bits = VL_RAMP
@@ -78,15 +78,15 @@ class ProfileTorque(DriveRamped):
     number = OperationMode.PROFILE_TORQUE
 
     def preload(self, actual: Actual) -> Promise[None]:
-        """Command the torque that the drive has, so that it drops no load."""
+        """Command the actual torque, so that the drive does not drop a load."""
         return self._deliver(actual.torque)
 
     def brake(self) -> None:
-        """Rely on bit 8: no torque at all would drop a load."""
+        """Rely on bit 8: commanding zero torque would drop a load."""
 
 
 class MasterRamped(Mode):
-    """A value in each cycle, which the master ramps to the target."""
+    """Base of the modes in which the master ramps the value, cycle by cycle."""
 
     cyclic = True
 
@@ -100,8 +100,8 @@ class MasterRamped(Mode):
         """Begin at zero.
 
         Args:
-            slope: Greatest change in user units per second, away from zero.
-            braking: The same towards zero; None for ``slope``.
+            slope: Greatest change away from zero in user units per second.
+            braking: Greatest change towards zero, likewise; None for ``slope``.
         """
         self._target = target
         self._scale = scale
@@ -111,7 +111,7 @@ class MasterRamped(Mode):
 
     def set_target(self, target: float) -> Promise[None]:
         """Ramp to a value."""
-        # refuse now what could not be sent on arrival
+        # refuse now a target that could not be sent at the end of the ramp
         self._scale.to_device(target, self._target.limits)
         self._goal = target
         return IN_THE_IMAGE
@@ -125,7 +125,7 @@ class MasterRamped(Mode):
         difference = self._goal - self._value
         change = (self._braking if difference * self._value < 0.0 else self._slope)() * period
         step = max(-change, min(change, difference))
-        if self._value * (self._value + step) < 0.0:  # beyond zero it is the other slope
+        if self._value * (self._value + step) < 0.0:  # the other slope applies beyond zero
             step = -self._value
         self._value += step
         self._target.write(self._scale.to_device(self._value))
@@ -144,7 +144,7 @@ class CyclicVelocity(MasterRamped):
         return self._value == 0.0
 
     def preload(self, actual: Actual) -> Promise[None]:
-        """Begin at the actual velocity, and brake from it."""
+        """Start at the actual velocity and ramp to zero."""
         self._value, self._goal = self._scale.commanded(actual.velocity_dev), 0.0
         return self._target.deliver(actual.velocity_dev)
 
@@ -158,10 +158,10 @@ class CyclicTorque(MasterRamped):
     number = OperationMode.CYCLIC_TORQUE
 
     def brake(self) -> None:
-        """Rely on bit 8, and end the ramp: the torque that is commanded may hold a load."""
+        """Rely on bit 8, and stop the ramp: the present torque may hold a load."""
         self._goal = self._value
 
     def preload(self, actual: Actual) -> Promise[None]:
-        """Keep the torque that the drive has, so that it drops no load."""
+        """Command the actual torque, so that the drive does not drop a load."""
         self._value = self._goal = self._scale.commanded(actual.torque)
         return self._target.deliver(actual.torque)
