@@ -291,7 +291,7 @@ def test_what_limits_is_in_the_set_point() -> None:
     assert causes & {Cause.JOINT_VELOCITY, Cause.SINGULARITY, Cause.JOINT_ACCELERATION}
     limited = next(report for report in reports if report.limiters)
     assert limited.factor < 1.0
-    assert 'x' in str(limited)
+    assert '%' in str(limited)
 
 
 def test_nothing_is_commanded_before_the_position_is_known() -> None:
