@@ -270,23 +270,26 @@ def report(
     bad = [f'{count} x {what}' for what, count in Counter(robots.failures).items()]
     for name, usage in usages.items():
         slope, samples = usage.slope(warm_up), usage.samples
-        settled = next(s for s in samples if s.time >= samples[0].time + warm_up)
-        at_end = samples[-1]
-        changes = [
-            f'{getattr(settled, what)} -> {getattr(at_end, what)}'
+        late = [s for s in samples if s.time >= samples[0].time + warm_up]
+        settled, at_end = late[0], late[-1]
+        half = max(len(late) // 2, 1)
+        # the fewest of either half: a goal has timers, each a thread of rclpy, while it runs
+        changes = {
+            what: [min(getattr(s, what) for s in part) for part in (late[:half], late[-half:])]
             for what in ('threads', 'descriptors')
-        ]
+        }
+        threads, descriptors = (f'{before} -> {after}' for before, after in changes.values())
         print(
             f'{name:12}{samples[0].memory:14.1f}{at_end.memory:10.1f}{slope:8.2f}'
-            f'{changes[0]:>14}{changes[1]:>14}'
+            f'{threads:>14}{descriptors:>14}'
         )
         grown = slope * (at_end.time - settled.time) / 3600.0
         if slope > LARGEST_SLOPE and grown > NOISE:
             bad.append(f'{name}: memory grows by {slope:.2f} MB/h after {warm_up:.0f} s')
         bad += [
-            f'{name}: {what} {getattr(settled, what)} -> {getattr(at_end, what)}'
-            for what in ('threads', 'descriptors')
-            if getattr(at_end, what) > getattr(settled, what)
+            f'{name}: {what} {before} -> {after}'
+            for what, (before, after) in changes.items()
+            if after > before
         ]
     bad += [f'{key}: {count}' for key, count in lost.items() if count]
     print('verdict: ' + ('; '.join(bad) or 'nothing lost, nothing grows'))
