@@ -273,7 +273,7 @@ def report(
         late = [s for s in samples if s.time >= samples[0].time + warm_up]
         settled, at_end = late[0], late[-1]
         half = max(len(late) // 2, 1)
-        # the fewest of either half: a goal has timers, each a thread of rclpy, while it runs
+        # the fewest of either half: while a goal runs the master has up to two threads more
         changes = {
             what: [min(getattr(s, what) for s in part) for part in (late[:half], late[-half:])]
             for what in ('threads', 'descriptors')

@@ -42,6 +42,18 @@ def message(goal: object) -> Any:
     return SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
 
 
+def on_its_way(monkeypatch: pytest.MonkeyPatch) -> tuple[Drives, GoalNode, Any]:
+    """Send a goal in the time of simulated drives, and let them follow it for 100 cycles."""
+    drives = Drives().following()
+    clock = SimpleNamespace(monotonic=lambda: drives.now)
+    monkeypatch.setattr(motion_goals, 'time', clock)
+    node = action(monkeypatch, drives, drives.gateway.request)
+    there = [axis.setpoint + 0.5 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
+    drives.run(100)
+    return drives, node, goal
+
+
 def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -89,13 +101,7 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
 
 def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """It failed while it was watched, and no cycle comes in which the arm is at rest."""
-    drives = Drives().following()
-    clock = SimpleNamespace(monotonic=lambda: drives.now)
-    monkeypatch.setattr(motion_goals, 'time', clock)
-    node = action(monkeypatch, drives, drives.gateway.request)
-    there = [axis.setpoint + 0.5 for axis in drives.axes]
-    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
-    drives.run(100)
+    drives, node, goal = on_its_way(monkeypatch)
     monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
     node.watch()
     assert goal.ending == ''
@@ -110,13 +116,7 @@ def test_a_canceled_goal_is_answered_when_rest_was_seen(
     monkeypatch: pytest.MonkeyPatch, rests: bool
 ) -> None:
     """Drives come to rest later than their set-points; where they do not, the answer says so."""
-    drives = Drives().following()
-    clock = SimpleNamespace(monotonic=lambda: drives.now)
-    monkeypatch.setattr(motion_goals, 'time', clock)
-    node = action(monkeypatch, drives, drives.gateway.request)
-    there = [axis.setpoint + 0.5 for axis in drives.axes]
-    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
-    drives.run(100)
+    drives, node, goal = on_its_way(monkeypatch)
     node.cancel(goal)
     drives.run(300)
     drives.axes = [replace(axis, velocity=0.1) for axis in drives.axes]

@@ -386,7 +386,7 @@ class RemoteObjects:
         self.image.store(index, subindex, value)
 
         def set_back(end: Promise[None]) -> None:
-            unchanged = self.image.commanded(index, subindex) == value  # not published since
+            unchanged = self.image.commanded(index, subindex) == value  # by a later write
             if end.error is not None and unchanged:
                 self.image.store(index, subindex, before)
 
