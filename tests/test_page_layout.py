@@ -54,6 +54,9 @@ IS_STOP = '([x, y]) => document.elementFromPoint(x, y).closest("#robot-stop") !=
 BOXES = """selector => Object.fromEntries([...document.querySelectorAll(selector)].map(e =>
   [e.innerText, e.getBoundingClientRect()]).filter(([, b]) => b.width > 0).map(([text, b], n) =>
   [n + text, [b.left, b.top, b.width, b.height]]))"""
+PICTURE_FITS = """() => [...document.querySelectorAll('canvas')].every(canvas => {
+  const [one, two] = [canvas, canvas.parentElement].map(e => e.getBoundingClientRect());
+  return one.width === two.width && one.height === two.height; })"""
 CONTRASTS = """() => {
   const part = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
   const light = c => 0.2126 * part(c[0]) + 0.7152 * part(c[1]) + 0.0722 * part(c[2]);
@@ -207,6 +210,7 @@ def check_reach(page: Page, size: str) -> None:
     assert page.evaluate(IS_STOP, middle)
     name = page.locator('#rv-robot')
     assert (name.inner_text().split(), name.is_visible()) == (['simulated', 'panda'], True)
+    page.wait_for_function(PICTURE_FITS)  # viser sizes its two canvases one after the other
     picture = boxes(page, 'canvas')
     x, y, seen, tall = next(iter(picture.values()))
     areas = boxes(page, 'canvas, #rv-bar, #rv-foot, .mantine-Paper-root:has([role=tab])')
