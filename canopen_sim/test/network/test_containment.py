@@ -29,7 +29,7 @@ from arm_canopen import (
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import DriveConfig
-from canopen_core.standard import DataType
+from canopen_core.standard import DataType, MappedObject
 
 pytestmark = pytest.mark.slow
 
@@ -118,17 +118,12 @@ def test_a_failing_hook_keeps_neither_sync_nor_rpdos_from_being_sent(
 
 def typed(config: NodeConfig, index: int, data_type: DataType) -> NodeConfig:
     """Return a device whose RPDOs carry an object as another type."""
-    rpdos = tuple(
-        replace(
-            pdo,
-            mapping=tuple(
-                replace(mapped, data_type=data_type) if mapped.index == index else mapped
-                for mapped in pdo.mapping
-            ),
-        )
-        for pdo in config.rpdos
-    )
-    return replace(config, rpdos=rpdos)
+
+    def other(mapped: MappedObject) -> MappedObject:
+        return replace(mapped, data_type=data_type) if mapped.index == index else mapped
+
+    rpdos = (replace(pdo, mapping=tuple(map(other, pdo.mapping))) for pdo in config.rpdos)
+    return replace(config, rpdos=tuple(rpdos))
 
 
 NARROW = {
@@ -214,24 +209,23 @@ def assert_served(net: VirtualNetwork) -> None:
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION])
-@pytest.mark.parametrize(('position', 'velocity'), [(None, INTEGER32_MIN), (INTEGER32_MIN, None)])
+@pytest.mark.parametrize(
+    ('position', 'velocity', 'scales'),
+    [
+        (None, INTEGER32_MIN, {}),
+        (INTEGER32_MIN, None, {}),
+        (None, 3_000_000, {'scale_vel_to_dev': 1e7}),
+    ],
+    ids=['velocity', 'position', 'factors that are not reciprocal'],
+)
 def test_odd_values_of_a_disabled_drive_harm_nobody(
-    mode: OperationMode, position: int | None, velocity: int | None
+    mode: OperationMode, position: int | None, velocity: int | None, scales: dict[str, float]
 ) -> None:
-    """The smallest number in 0x6064 or 0x606C: SYNC goes on, the other drive accepts targets."""
-    net = pair(mode)
+    """The smallest number in 0x6064 or 0x606C, or one that does not fit 0x60FF by its factors."""
+    net = pair(mode, **scales)
     net.do(ODD, 'disable')
     report_actual(net, position, velocity)
     net.run(0.1)
-    assert_served(net)
-    assert not net.reported(Severity.ERROR)
-
-
-def test_factors_that_are_not_reciprocal_harm_nobody() -> None:
-    """A velocity that does not fit 0x60FF by these factors is clamped before it is written."""
-    net = pair(OperationMode.PROFILE_POSITION, scale_vel_to_dev=1e7)
-    net.do(ODD, 'disable')
-    report_actual(net, None, 3_000_000)
     assert_served(net)
     assert not net.reported(Severity.ERROR)
 
@@ -264,17 +258,15 @@ def test_an_encoder_without_reference_is_held_where_it_is() -> None:
     assert not [text for text in net.reported(Severity.ERROR) if 'stopping' in text]
 
 
-@pytest.mark.parametrize(
-    ('quantity', 'least'), [('position', INTEGER32_MIN), ('effort', -(2**15))]
-)
-def test_the_smallest_number_of_an_object_fits(quantity: str, least: int) -> None:
+def test_the_smallest_number_of_an_object_fits() -> None:
     """One more below zero than above it, and not one beyond."""
-    scale = getattr(Units(DriveConfig(scale_pos_to_dev=1.0)), quantity)
-    assert scale.to_device(least) == least
-    assert scale.to_device(-least - 1) == -least - 1
-    for beyond in (least - 1, -least):
-        with pytest.raises(DriveError, match='more than the object can hold'):
-            scale.to_device(beyond)
+    units = Units(DriveConfig(scale_pos_to_dev=1.0))
+    for scale, least in ((units.position, INTEGER32_MIN), (units.effort, -(2**15))):
+        assert scale.to_device(least) == least
+        assert scale.to_device(-least - 1) == -least - 1
+        for beyond in (least - 1, -least):
+            with pytest.raises(DriveError, match='more than the object can hold'):
+                scale.to_device(beyond)
 
 
 class Misbehaving(Leader):

@@ -129,17 +129,6 @@ def test_a_refusal_is_said_with_place_and_meaning(answer: str, words: str) -> No
     assert line.client.counters.aborted == 1
 
 
-def test_an_abort_in_the_middle_of_segments_ends_the_transfer() -> None:
-    """The next one in the queue is not disturbed by it."""
-    line = Line()
-    first, second = write(line, b'0123456789'), read(line)
-    line.receive('60 01 20 00 00 00 00 00')
-    line.receive('80 01 20 00 20 00 00 08')
-    assert isinstance(first.error, SdoAbortError)
-    line.receive('4F 18 10 01 2A 00 00 00')
-    assert second.result() == b'\x2a'
-
-
 @pytest.mark.parametrize('garbage', [0, 3])
 def test_silence_ends_in_a_time_out_that_is_reported_to_the_server(garbage: int) -> None:
     """Not before the time-out; the server gets an abort, the caller place, time and what came."""
@@ -192,44 +181,38 @@ def test_the_time_out_counts_for_each_answer() -> None:
     assert promise.result() == bytes(70)
 
 
-def test_the_time_out_begins_when_the_transfer_does() -> None:
-    """A transfer that waits in the queue does not time out there."""
-    line = Line()
-    first, second = read(line, 0x1000, 0), read(line)
-    line.pass_time(TIMEOUT)
-    assert isinstance(first.error, SdoTimeoutError)
-    line.pass_time(TIMEOUT * 0.9)
-    assert not second.done
-    line.receive('4F 18 10 01 2A 00 00 00')
-    assert second.result() == b'\x2a'
-
-
 def test_transfers_go_one_after_another_in_their_order() -> None:
-    """The second request leaves when the first is answered, not before."""
+    """The next request leaves when one has its answer, its abort or its time-out, not before.
+
+    Its own time-out begins then. One that is requested when another ends finds the client ready.
+    """
     line = Line()
     order: list[int] = []
 
-    def note(index: int, _: Promise[bytes]) -> None:
+    def note(index: int, promise: Promise[Any]) -> None:
         order.append(index)
+        if promise.error is not None:
+            read(line, index + 0x10, 0).when_done(partial(note, index + 0x10))
 
-    for index in (0x1000, 0x1001, 0x1002):
+    read(line, 0x1000, 0).when_done(partial(note, 0x1000))
+    write(line, b'0123456789', 0x1001).when_done(partial(note, 0x1001))
+    for index in (0x1002, 0x1003):
         read(line, index, 0).when_done(partial(note, index))
-    for index in (0x1000, 0x1001, 0x1002):
-        line.expect(f'40 {index & 0xFF:02X} 10 00 00 00 00 00')
-        line.receive(f'4F {index & 0xFF:02X} 10 00 00 00 00 00')
-    assert order == [0x1000, 0x1001, 0x1002]
-
-
-def test_a_transfer_may_be_requested_when_another_one_ends() -> None:
-    """A callback that reads again finds the client ready."""
-    line = Line()
-    second: list[Promise[bytes]] = []
-    read(line).when_done(lambda _: second.append(read(line, 0x1000, 0)))
-    line.sent.clear()
-    line.receive('4F 18 10 01 01 00 00 00')
     line.expect('40 00 10 00 00 00 00 00')
-    line.receive('4F 00 10 00 02 00 00 00')
-    assert second[0].result() == b'\2'
+    line.receive('4F 00 10 00 00 00 00 00')
+    line.expect('21 01 10 00 0A 00 00 00')
+    line.receive('60 01 10 00 00 00 00 00')
+    line.receive('80 01 10 00 20 00 00 08')
+    assert line.sent[-1] == bytes.fromhex('40 02 10 00 00 00 00 00')
+    line.pass_time(TIMEOUT)
+    assert line.sent[-1] == bytes.fromhex('40 03 10 00 00 00 00 00')
+    line.pass_time(TIMEOUT * 0.9)
+    assert order == [0x1000, 0x1001, 0x1002]
+    line.receive('4F 03 10 00 2A 00 00 00')
+    for index in (0x1011, 0x1012):
+        assert line.sent[-1][:3] == bytes((0x40, index & 0xFF, 0x10))
+        line.receive(f'4F {index & 0xFF:02X} 10 00 00 00 00 00')
+    assert order == [0x1000, 0x1001, 0x1002, 0x1003, 0x1011, 0x1012]
 
 
 @pytest.mark.parametrize('repeat', [True, False])
@@ -361,20 +344,6 @@ def test_every_answer_belongs_to_its_question(fates: list[str]) -> None:
             assert promise.result() == bytes((number,))
 
 
-def test_a_segment_of_a_transfer_that_timed_out_is_not_taken_for_another() -> None:
-    """The late segment of one object does not become data of the next."""
-    line = Line()
-    read(line, 0x1008, 0)
-    line.receive('41 08 10 00 07 00 00 00')
-    line.pass_time(TIMEOUT)
-    line.sent.clear()
-    second = read(line, 0x1009, 0)
-    line.receive('01 4C 61 74 65 00 00 00')
-    line.receive('41 09 10 00 07 00 00 00')
-    line.receive('01 47 6F 6F 64 21 21 21')
-    assert second.result() == b'Good!!!'
-
-
 def test_a_device_that_announces_no_length_is_stopped_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """An upload without end is ended."""
     monkeypatch.setattr('arm_canopen.master.sdo_client.UNANNOUNCED_MAX', 1000)
@@ -391,25 +360,30 @@ def test_a_device_that_announces_no_length_is_stopped_too(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize('progress', range(4))
 def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
-    """Wherever the first transfer stands, all get the reason, and the next one works."""
+    """Wherever the first transfer stands, all get the reason, and the next ones work.
+
+    Also one that is requested at once, in the clearing.
+    """
     line = Line()
-    server = SdoByteServer(values={(0x1018, 1): b'\x2a'})
+    server = SdoByteServer(values={(0x1018, 1): b'\x2a', (0x1018, 2): b'*'})
     promises: list[Promise[Any]] = [write(line, b'0123456789'), read(line), read(line)]
     for _ in range(progress):
         if line.sent and (answer := server.answer(line.sent.pop(0))) is not None:
             line.receive(answer)
+    again: list[Promise[bytes]] = []
+    promises[-1].when_done(lambda _: again.append(read(line, subindex=2)))
     line.sent.clear()
     line.client.cancel_all('the device restarted')
-    assert [data[0] for data in line.sent] == [0x80], 'the device got no abort'
+    assert line.sent[0][0] == 0x80, 'the device got no abort'
     for promise in promises[1:] if progress == 3 else promises:
         with pytest.raises(SdoError, match='joint1: the device restarted'):
             promise.result()
-    line.sent.clear()
     line.receive('4F 18 10 01 63 00 00 00')
     after = read(line)
     assert not after.done, 'a late answer was taken for the new one'
+    del line.sent[:1]
     line.serve(server.answer)
-    assert after.result() == b'\x2a'
+    assert (again[0].result(), after.result()) == (b'*', b'\x2a')
     assert line.defects == []
 
 
@@ -459,19 +433,6 @@ def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_outstandin
         line.expect(request)
         line.pass_time(TIMEOUT)
         line.sent.clear()
-
-
-def test_who_requests_again_when_cancelled_is_served_after_it() -> None:
-    """A caller that repeats at once does not get lost in the clearing."""
-    line = Line()
-    again: list[Promise[bytes]] = []
-    first = read(line)
-    first.when_done(lambda _: again.append(read(line)))
-    line.client.cancel_all('the device restarted')
-    assert not again[0].done
-    line.sent = line.sent[-1:]
-    line.serve(SdoByteServer(values={(0x1018, 1): b'\x2a'}).answer)
-    assert again[0].result() == b'\x2a'
 
 
 @given(st.lists(st.binary(max_size=8), max_size=30))

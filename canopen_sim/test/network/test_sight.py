@@ -342,59 +342,47 @@ def test_verdicts(
 def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions(
     setpoint: float, position: float, verdict: Following
 ) -> None:
-    """Set-points that moved meanwhile have left it behind; a droop may pass."""
+    """Set-points that moved meanwhile have left it behind; a droop may pass.
+
+    A sight that is too short to judge, one position and silence again, forgets nothing.
+    """
     watch = FollowingWatch()
-    limits = {'margin': 0.1, 'window': 0.1}
+
+    def judge(now: float, *where: float, received: int) -> Following:
+        limits = {'margin': 0.1, 'window': 0.1}
+        return watch.judge(now, *where, error=False, received=received, **limits)
+
     for cycle in range(10):
-        seen = watch.judge(cycle * PERIOD, 0.0, 0.0, error=False, received=cycle, **limits)
-        assert seen is Following.FOLLOWS
-    watch.lose_sight()
-    watch.lose_sight()
+        assert judge(cycle * PERIOD, 0.0, 0.0, received=cycle) is Following.FOLLOWS
     stuck = verdict is Following.LEFT_BEHIND
-    first = watch.judge(1.0, setpoint, position, error=False, received=10, **limits)
-    assert first is (Following.UNDECIDED if stuck else verdict)
-    second = watch.judge(1.01, setpoint, position, error=False, received=11, **limits)
-    assert second is verdict
+    for received, now in ((10, 1.0), (11, 2.0)):
+        watch.lose_sight()
+        watch.lose_sight()
+        first = judge(now, setpoint, position, received=received)
+        assert first is (Following.UNDECIDED if stuck else verdict)
+    assert judge(2.01, setpoint, position, received=12) is verdict
 
 
-def test_a_sight_that_is_too_short_to_judge_forgets_nothing() -> None:
-    """One position, and silence again: where it was seen before still counts."""
-    watch = FollowingWatch()
-
-    def judge(now: float, setpoint: float, received: int) -> Following:
-        return watch.judge(
-            now, setpoint, 0.0, margin=0.1, window=0.5, error=False, received=received
-        )
-
-    for cycle in range(10):
-        judge(cycle * PERIOD, 0.0, cycle)
-    watch.lose_sight()
-    assert judge(1.0, 0.3, 10) is Following.UNDECIDED
-    watch.lose_sight()
-    assert judge(2.0, 0.3, 11) is Following.UNDECIDED
-    assert judge(2.01, 0.3, 12) is Following.LEFT_BEHIND
-
-
+@pytest.mark.parametrize('late', [False, True], ids=['pause of the master', 'late frames'])
 @STREAMED
-def test_drives_are_not_blamed_for_a_pause_of_the_master(mode: OperationMode) -> None:
-    """No SYNC asked them meanwhile; the motion goes on where it was."""
+def test_drives_are_not_blamed_for_a_pause(mode: OperationMode, *, late: bool) -> None:
+    """No SYNC asked them meanwhile, or their frames come late: the motion goes on where it was.
+
+    The first position that comes is old, and a set-point there would make the axis jump.
+    """
     config = replace(with_window(0xFFFF_FFFF), heartbeat_producer=0.0, heartbeat_timeout=0.0)
     led = Led(mode, Leader(), config)
-    led.net.now += TIME_OUT + 0.2  # nothing of the master runs
-    found = led.velocities(1.0)
-    assert -0.02 < min(found) <= max(found) < 1.5
-    assert not led.source.losses
-    assert 'has not answered' not in str(led.net.reported(Severity.WARNING))
-
-
-@STREAMED
-def test_frames_that_were_late_are_not_taken_for_lost(mode: OperationMode) -> None:
-    """The first position that comes is old, and a set-point there would make the axis jump."""
-    config = replace(with_window(0xFFFF_FFFF), heartbeat_producer=0.0, heartbeat_timeout=0.0)
-    led = Led(mode, Leader(), config)
-    led.net.wire.stall(led.net.now, TIME_OUT + 0.05)
-    assert min(led.velocities()) > -0.02
+    if late:
+        led.net.wire.stall(led.net.now, TIME_OUT + 0.05)
+    else:
+        led.net.now += TIME_OUT + 0.2  # nothing of the master runs
+    found = led.velocities()
+    assert min(found) > -0.02
     assert not led.net.reported(Severity.ERROR)
+    if not late:
+        assert max(found) < 1.5
+        assert not led.source.losses
+        assert 'has not answered' not in str(led.net.reported(Severity.WARNING))
 
 
 def on_change(transmission: int = 255, *, timer: bool = True) -> NodeConfig:
@@ -428,10 +416,13 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     assert not [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
 
 
-@STREAMED
-@pytest.mark.parametrize(
+UNNOTICED = pytest.mark.parametrize(
     'config', [on_change(timer=False), on_change(0)], ids=['no timer', 'type 0']
 )
+
+
+@STREAMED
+@UNNOTICED
 def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     config: NodeConfig, mode: OperationMode
 ) -> None:
@@ -445,11 +436,6 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
     led.net.run(5.0)
     assert led.net.simulated().state is DriveState.SWITCH_ON_DISABLED
-
-
-UNNOTICED = pytest.mark.parametrize(
-    'config', [on_change(timer=False), on_change(0)], ids=['no timer', 'type 0']
-)
 
 
 @pytest.mark.parametrize('verb', ['enable', 'recover', 'init'])
@@ -535,29 +521,15 @@ def test_a_drive_that_moved_unseen_is_enabled_where_it_is(
     assert led.net.motor() == pytest.approx(rest, abs=1e-3)
 
 
-def test_a_device_that_refuses_its_event_timer_is_named() -> None:
-    """It boots, and is not taken for silent when it only rests."""
-    without = on_change(timer=False).dictionary
-    config = replace(bus_config(on_change()), locations={(JOINT,): Place()})
-    net = VirtualNetwork(config, dictionaries={JOINT: without})
-    net.boot()
-    net.run(2.0)
-    assert net.drives[JOINT].view.fresh
-    warnings = [text for text in net.reported(Severity.WARNING) if 'goes unnoticed' in text]
-    assert len(warnings) == 1
-    net.power_off(JOINT)
-    net.run(0.5)
-    net.power_on(JOINT)
-    net.run_until(net.all_ready)
-    assert len([text for text in net.reported() if 'goes unnoticed' in text]) == 1
+def test_a_device_that_refuses_its_event_timer_is_named_until_it_takes_it() -> None:
+    """It boots, and is not taken for silent when it only rests; from then on a loss is noticed.
 
-
-def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
-    """The loss is noticed from then on, and a device that refuses it once more is named again."""
+    Refused again at the next boot it is not named again, but it is once it took it meanwhile.
+    """
     net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): Place()}))
     refused = FaultInjection(Fault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
     net.start()
-    for refuses in (True, False, True):
+    for refuses, named in ((True, True), (True, False), (False, False), (True, True)):
         begin = len(net.reported(Severity.WARNING))
         net.power_off(JOINT)
         net.run(0.5)
@@ -566,7 +538,7 @@ def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
             device.faults.inject(refused, net.now)
         net.run_until(net.all_ready)
         reported = net.reported(Severity.WARNING)[begin:]
-        assert any('TPDO 1: its loss goes unnoticed' in text for text in reported) is refuses
+        assert any('TPDO 1: its loss goes unnoticed' in text for text in reported) is named
         net.run(2.0)
         assert net.drives[JOINT].view.fresh
         net.lose(0x180 + NODE_ID)
