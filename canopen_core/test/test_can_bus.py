@@ -107,17 +107,31 @@ FRAMES = [
     Frame(0x1FFF_FFFF, b'12345678', is_extended=True),
     Frame(0x0001_0000, is_extended=True, is_remote=True),
 ]
+WRONG = [Frame(0x800), Frame(-1), Frame(0x2000_0000, is_extended=True), Frame(1, bytes(9))]
 
 
 def test_frames_arrive_unchanged_and_in_order(connect: Open) -> None:
-    """Identifiers, lengths, both formats and remote requests all survive; each side counts."""
+    """Identifiers, lengths, both formats and remote requests all survive; each side counts.
+
+    A wrong identifier or payload is the caller's mistake, and nothing is sent. The stamps are
+    steady time between sending and reading, and never go back.
+    """
     sender, receiver = connect(), connect()
+    for wrong in WRONG:
+        with pytest.raises(ValueError, match=r'out of range|at most 8'):
+            sender.send(wrong)
+    before = monotonic()
     for frame in FRAMES:
         sender.send(frame)
-    assert unstamped(receive_count(receiver, len(FRAMES))) == FRAMES
+    received = receive_count(receiver, len(FRAMES))
+    after = monotonic()
+    assert unstamped(received) == FRAMES
     assert (sender.counters.sent, sender.counters.received) == (len(FRAMES), 0)
     assert (receiver.counters.sent, receiver.counters.received) == (0, len(FRAMES))
     assert (receiver.counters.lost, receiver.counters.malformed) == (0, 0)
+    stamps = [frame.timestamp for frame in received]
+    skew = 1e-3  # [s] between the clock of the stamps and the steady one
+    assert [before - skew, *stamps, after + skew] == sorted([before - skew, *stamps, after + skew])
 
 
 def test_everybody_else_receives_and_the_sender_does_not(connect: Open) -> None:
@@ -152,56 +166,26 @@ def test_a_burst_is_not_lost(connect: Open) -> None:
     assert receiver.counters.lost == 0
 
 
-def test_time_stamps_are_steady_time_of_arrival(connect: Open) -> None:
-    """Stamps never go back, and lie between sending and reading."""
-    sender, receiver = connect(), connect()
-    before = monotonic()
-    for frame in FRAMES:
-        sender.send(frame)
-    frames = receive_count(receiver, len(FRAMES))
-    after = monotonic()
-    stamps = [frame.timestamp for frame in frames]
-    assert stamps == sorted(stamps)
-    skew = 1e-3  # [s] between the clock of the stamps and the steady one
-    assert before - skew <= stamps[0]
-    assert stamps[-1] <= after + skew
-
-
-def test_a_timeout_is_waited_for_and_zero_only_looks(connect: Open) -> None:
-    """An empty bus makes receive wait for its time-out; no time-out and negative ones return."""
-    bus = connect()
+def test_a_wait_ends_with_its_time_out_a_frame_or_a_wake(connect: Open) -> None:
+    """No time-out and negative ones only look; a wake before the wait counts, and once."""
+    bus, other = connect(), connect()
     start = monotonic()
     assert bus.receive(0.0) == []
     assert bus.receive(-1.0) == []
     assert bus.receive(0.05) == []
     assert monotonic() - start >= 0.05
-
-
-def test_receive_returns_what_is_there_although_it_could_wait(connect: Open) -> None:
-    """A frame that has arrived ends the waiting."""
-    sender, receiver = connect(), connect()
-    sender.send(Frame(1))
-    assert unstamped(receiver.receive(math.inf)) == [Frame(1)]
-
-
-def test_a_wait_without_an_end_lasts_until_it_is_woken(connect: Open) -> None:
-    """However far the receiver has come by then."""
-    bus = connect()
-    alarm = Timer(0.05, bus.wake)
-    alarm.start()
-    assert bus.receive(math.inf) == []
-    alarm.join(DEADLINE)
-
-
-def test_a_wake_before_the_wait_is_not_forgotten_and_counts_once(connect: Open) -> None:
-    """The next receive returns, however often it was woken, and the one after waits again."""
-    bus = connect()
+    other.send(Frame(1))
+    assert unstamped(bus.receive(math.inf)) == [Frame(1)]
     bus.wake()
     bus.wake()
     assert bus.receive(math.inf) == []
     start = monotonic()
     assert bus.receive(0.02) == []
     assert monotonic() - start >= 0.02
+    alarm = Timer(0.05, bus.wake)
+    alarm.start()
+    assert bus.receive(math.inf) == []
+    alarm.join(DEADLINE)
 
 
 def test_threads_may_send_together(connect: Open) -> None:
@@ -223,26 +207,6 @@ def test_threads_may_send_together(connect: Open) -> None:
     for thread in range(threads):
         numbers = [int.from_bytes(f.data, 'little') for f in frames if f.can_id == thread]
         assert numbers == list(range(count))
-
-
-@pytest.mark.parametrize(
-    'frame',
-    [
-        Frame(0x800),
-        Frame(-1),
-        Frame(0x2000_0000, is_extended=True),
-        Frame(1, bytes(9)),
-    ],
-    ids=['11 bits', 'negative', '29 bits', 'payload'],
-)
-def test_what_is_no_can_frame_is_refused(connect: Open, frame: Frame) -> None:
-    """A wrong identifier or payload is the caller's mistake, and nothing is sent."""
-    sender, receiver = connect(), connect()
-    with pytest.raises(ValueError, match=r'out of range|at most 8'):
-        sender.send(frame)
-    sender.send(Frame(1))
-    assert unstamped(receive_count(receiver, 1)) == [Frame(1)]
-    assert sender.counters.sent == 1
 
 
 def test_closing_twice_is_no_error_and_a_closed_bus_says_so(connect: Open) -> None:
@@ -289,7 +253,7 @@ def test_threads_may_close_and_open_buses_while_others_use_them(connect: Open) -
             right.close()
 
     def serve_often() -> None:
-        for number in range(60):
+        for number in range(24):
             serve(number % 4 * 1e-3)
         served.append(True)
 
@@ -305,32 +269,30 @@ MULTICAST = f'udp_multicast:239.74.7.2:{43113 + os.getuid() % 10_000}'
 
 
 @pytest.mark.parametrize(
-    ('interfaces', 'expected'),
+    ('interface', 'expected'),
     [
-        ({}, MULTICAST),
-        ({'vcan0': CanInterface('vcan0', is_up=True, queue_length=1000)}, 'vcan0'),
-        (
-            {'vcan0': CanInterface('vcan0', is_up=False, queue_length=1000)},
-            MULTICAST,
-        ),
-        (
-            {'can0': CanInterface('can0', is_up=True, queue_length=10)},
-            MULTICAST,
-        ),
+        (None, MULTICAST),
+        (CanInterface('vcan0', is_up=True, queue_length=1000), 'vcan0'),
+        (CanInterface('vcan0', is_up=False, queue_length=1000), MULTICAST),
+        (CanInterface('can0', is_up=True, queue_length=10), MULTICAST),
     ],
     ids=['none', 'vcan0', 'vcan0 down', 'real can0'],
 )
 def test_auto_takes_vcan0_when_it_is_up_and_never_real_hardware(
-    monkeypatch: pytest.MonkeyPatch, interfaces: dict[str, CanInterface], expected: str
+    monkeypatch: pytest.MonkeyPatch, interface: CanInterface | None, expected: str
 ) -> None:
-    """Without a name nothing real is ever driven."""
-    monkeypatch.setattr(opening, 'can_interfaces', lambda: interfaces)
+    """Without a name nothing real is ever driven; other names mean themselves."""
+    there = {interface.name: interface} if interface else {}
+    monkeypatch.setattr(opening, 'can_interfaces', lambda: there)
     monkeypatch.setenv('ROS_DOMAIN_ID', '7')
     assert resolve_name('auto') == expected
+    assert resolve_name('can0') == 'can0'
 
 
-def test_users_and_domains_have_buses_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And further ones for further robots: no two of them are the same."""
+def test_users_and_domains_have_buses_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And further ones for further robots: no two of them are the same; the choice is logged."""
     monkeypatch.setattr(opening, 'can_interfaces', dict)
     names: list[str] = []
     for user in (0, 1000, 1001):
@@ -343,23 +305,8 @@ def test_users_and_domains_have_buses_of_their_own(monkeypatch: pytest.MonkeyPat
     for name in names:
         with open_bus(name) as bus:
             assert bus.name == name
-
-
-def test_auto_says_which_bus_it_took(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    """The choice is logged, and the bus has the name of what was chosen."""
-    chosen = free_virtual()
-    monkeypatch.setattr(opening, 'resolve_name', lambda name: chosen)
     with caplog.at_level(logging.INFO), open_bus('auto') as bus:
-        assert bus.name == chosen
-    assert f'auto is {chosen}' in caplog.text
-
-
-@pytest.mark.parametrize('name', ['can0', 'udp_multicast', 'virtual:x', 'pcan:X@500000'])
-def test_other_names_mean_themselves(name: str) -> None:
-    """Only auto is a choice."""
-    assert resolve_name(name) == name
+        assert f'auto is {bus.name}' in caplog.text
 
 
 @pytest.mark.parametrize('name', ['', ':', ':x', 'virtual:', 'pcan:'])
@@ -408,7 +355,7 @@ CALLERS, CALLS = 3, 2000
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('attempt', range(5))  # what may go wrong does not do so each time
+@pytest.mark.parametrize('attempt', range(3))  # what may go wrong does not do so each time
 def test_all_that_is_handed_over_around_the_end_is_answered(
     attempt: int, request: pytest.FixtureRequest
 ) -> None:

@@ -75,19 +75,10 @@ def test_the_bound_is_reached() -> None:
 def test_the_mean_is_that_of_random_frames(size: int, is_extended: bool) -> None:
     """Random identifiers and payloads have as many stuff bits as the estimate says."""
     source = random.Random(301)
-    count = 3000
-    total = sum(
-        stuff_bits(
-            stuffed_region(
-                Frame(
-                    source.getrandbits(29 if is_extended else 11),
-                    source.randbytes(size),
-                    is_extended=is_extended,
-                )
-            )
-        )
-        for _ in range(count)
-    )
+    count, width, total = 3000, 29 if is_extended else 11, 0
+    for _ in range(count):
+        can_id, data = source.getrandbits(width), source.randbytes(size)
+        total += stuff_bits(stuffed_region(Frame(can_id, data, is_extended=is_extended)))
     # up to one more for the fixed dominant bits (RTR, IDE, r0, the upper ones of a short length)
     assert 0.0 <= total / count - stuff_bits_mean(size, is_extended=is_extended) <= 1.1
 
@@ -121,16 +112,12 @@ def test_the_window_slides() -> None:
     assert figures.load == 0.0
 
 
-def test_error_frames_are_free_and_two_questions_at_once_are_no_division_by_zero() -> None:
-    """The controller's notes are not on the wire; an empty span has no rate."""
+def test_odd_figures() -> None:
+    """Error frames are not on the wire, an empty span has no rate, no bit rate has no load."""
     load = BusLoad(500_000, now=5.0)
     load.count(Frame(0x40, bytes(8), is_error=True))
     assert load.figures(5.0).frames_per_second == 0.0
     assert load.figures(6.0).frames_per_second == 0.0
-
-
-@pytest.mark.parametrize(('bitrate', 'window'), [(0, 1.0), (-1, 1.0), (1000, 0.0)])
-def test_nonsense_is_refused(bitrate: int, window: float) -> None:
-    """A bus without bit rate has no load."""
-    with pytest.raises(ValueError, match='must be positive'):
-        BusLoad(bitrate, 0.0, window)
+    for bitrate, window in ((0, 1.0), (-1, 1.0), (1000, 0.0)):
+        with pytest.raises(ValueError, match='must be positive'):
+            BusLoad(bitrate, 0.0, window)
