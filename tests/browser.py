@@ -41,6 +41,8 @@ POLITE = ('nice', '-n', '5')
 UNPRIVILEGED = ('setpriv', '--bounding-set=-sys_nice')
 """As root a browser would have the process that draws at nice -8, before the robots."""
 SIZE = {'width': 820, 'height': 560}  # [px] a software renderer draws it
+SIZES = {'desk': (1440, 900), 'tablet': (1024, 768), 'phone': (390, 844), 'short': (390, 664)}
+"""Width and height in [px] for which the page is made."""
 PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 TEXT_TIMEOUT = 5_000  # [ms] of a page that may hang
 PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
@@ -63,12 +65,16 @@ for (const kind of [WebGLRenderingContext, WebGL2RenderingContext])
 """Pixels of the scene are drawn where a test looks at them: one picture costs a core a second."""
 TWO_PICTURES = """() => new Promise(
   (done) => requestAnimationFrame(() => requestAnimationFrame(done)))"""
-IN_SIGHT = """(element) => {
-  element.scrollIntoViewIfNeeded();
+REACHED = """element => {
   const box = element.getBoundingClientRect();
   return element.contains(
     document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2));
 }"""
+"""Whether a click on the middle of an element reaches it."""
+IN_SIGHT = f"""element => {{
+  element.scrollIntoViewIfNeeded();
+  return ({REACHED})(element);
+}}"""
 """A folder that is still folded out hides what has its place already."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
@@ -78,6 +84,9 @@ BELOW = 100  # [px] height of views and messages
 STANDS = 200  # [ms] in one place
 NEAR = 0.02  # share of a slider's way from where it was dragged to
 GROUPS = 4  # tabs of each page
+ACTIVE = """() => [...document.querySelectorAll('.rv-hold:not(.rv-always)')].filter(hold =>
+  getComputedStyle(hold).cursor !== 'not-allowed').map(hold => hold.innerText)"""
+"""Buttons that would move the robot."""
 
 
 _started: list[Browser] = []
@@ -248,6 +257,20 @@ def _colors_of_scene(page: Page) -> int:
 def state_is(page: Page, word: str) -> None:
     """Wait until the state of the robot on a page is a word, or begins with it."""
     page.locator('#rv-state b').filter(has_text=re.compile(f'^{word}')).wait_for()
+
+
+def see_fault(page: Page, reason: str, action: str) -> None:
+    """Check that a fault is seen in each group at each size, and that nothing can be moved."""
+    state, button = page.locator('#rv-state'), page.locator('#rv-do')
+    for size, (width, height) in SIZES.items():
+        page.set_viewport_size({'width': width, 'height': height})
+        for group in page.locator('[role=tab]').all_inner_texts()[:GROUPS]:
+            show(page, group)
+            where = size, group
+            assert re.match(f'FAULT.*{reason}', state.inner_text(), re.DOTALL), where
+            assert (button.inner_text(), button.evaluate(REACHED)) == (action, True), where
+            assert not page.evaluate(ACTIVE), where
+    page.set_viewport_size(SIZE)  # type: ignore[arg-type]
 
 
 def act(page: Page, action: str) -> None:

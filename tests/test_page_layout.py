@@ -18,6 +18,7 @@ from types import SimpleNamespace
 from typing import Any, cast, TYPE_CHECKING
 
 import browser as chromium
+from browser import ACTIVE, SIZES
 from manual_page import CHECKOUT
 import pytest
 from urdf_reader import read_urdf
@@ -36,7 +37,6 @@ pytestmark = [
     pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking()),
 ]
 
-SIZES = {'desk': (1440, 900), 'tablet': (1024, 768), 'phone': (390, 844), 'short': (390, 664)}
 PHONES = {'phone', 'short'}
 GROUPS = ['Drive', 'Plan', 'See', 'Diagnose']
 JOG_BUTTONS = 14
@@ -85,8 +85,6 @@ CONTRASTS = """() => {
   }
   return found;
 }"""
-ACTIVE = """() => [...document.querySelectorAll('.rv-hold:not(.rv-always)')].filter(hold =>
-  getComputedStyle(hold).cursor !== 'not-allowed').map(hold => hold.innerText)"""
 REDS = """() => [...document.querySelectorAll('body *')].filter(e => {
   const b = e.getBoundingClientRect();
   if (!b.width || !b.height || e.closest('#robot-stop, canvas, svg, [role=dialog]')) return false;
@@ -148,7 +146,7 @@ def shown() -> Iterator[Shown]:
         tree = read_urdf(example_files().urdf.read_text())
         page.show_robot(tree)
         arm = tuple(f'panda_joint{number}' for number in range(1, 8))
-        made.offered = Offered(arm, tool=True, targets=arm)
+        made.offered = Offered(arm, True, (('/hand', arm[-1]),), arm)
         page.offer_drive(made.offered)
         page.velocity = lambda share: 0.4 * share
         page.offer_drives({f'/{joint}': ('enable', 'recover', 'halt', 'disable') for joint in arm})
@@ -277,6 +275,20 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
         assert boxes(page, '[role=tab]') == tab, 'a tab is not torn out'
 
 
+def test_the_groups_are_in_their_order_from_the_first_second(browser: Browser) -> None:
+    """In five starts of the page, without a robot and with one."""
+    actions = cast(Actions, SimpleNamespace(stop=print))
+    for _ in range(5):
+        with closing(RobotPage('127.0.0.1', 8650, actions)) as served:
+            page = chromium.open_page(browser, served.url, robot='')
+            tabs = page.locator('[role=tab]')
+            assert tabs.all_inner_texts() == GROUPS
+            served.show_robot(read_urdf(example_files().urdf.read_text()))
+            tabs.filter(has_text='Joints').wait_for()
+            assert tabs.all_inner_texts()[: len(GROUPS)] == GROUPS
+            page.close()
+
+
 def test_stop_is_in_reach_of_what_viser_opens(browser: Browser, shown: Shown) -> None:
     """Above a dialogue and a notification, on each size."""
     see(page := opened(browser, shown, 'desk'), shown, READY)
@@ -401,6 +413,16 @@ def test_a_press_of_a_button_that_does_nothing_says_why(
         assert size == 'desk' or top + high <= above
     shown.page.live.off.clear()
     why.wait_for(state='hidden')
+    chromium.show(page, 'Drive', 'Gripper')
+    open_it = page.get_by_role('button', name='Open gripper', exact=True)
+    for state in STATES:
+        see(page, shown, state)
+        page.locator(f'button:{"enabled" if state.movable else "disabled"}').filter(
+            has_text='Open gripper'
+        ).wait_for()
+        if not state.movable:
+            chromium.press(open_it)
+            why.filter(has_text=f'Open gripper: {state.sentence.strip()}').wait_for()
 
 
 @pytest.mark.parametrize('size', ['desk', 'phone', 'short'])

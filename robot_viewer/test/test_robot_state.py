@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -18,7 +19,17 @@ from sensor_msgs.msg import JointState
 
 from robot_viewer.nodes import state
 from robot_viewer.nodes.state import Judge, Watch
-from robot_viewer.robot_state import ALLOW, Level, robot_state, Seen, Status, Stop, walks
+from robot_viewer.robot_state import (
+    ALLOW,
+    Level,
+    robot_state,
+    Seen,
+    SILENCE,
+    STALE,
+    Status,
+    Stop,
+    walks,
+)
 
 PERIOD = 0.05  # [s]
 
@@ -89,6 +100,21 @@ def test_a_motion_from_before_a_stop_is_no_program(bench: Bench) -> None:
     assert bench.look(PERIOD, 0.0).startswith('STOPPED')
     assert bench.look(1.0, 0.0).startswith('STOPPED')
     assert 'A program moves it after STOP' in bench.look(0.2, 0.2)
+
+
+def test_what_came_before_a_silence_is_unknown(bench: Bench) -> None:
+    """Nothing of a robot that is silent stays green; what comes in the silence counts."""
+    bench.look(0.5, 0.0)
+    good = DiagnosticStatus(name='j1: drive', message='enabled')
+    bench.watch.take_statuses(DiagnosticArray(status=[good]))
+    bench.look(0.1, 0.0)
+    assert bench.watch.aged(bench.now)[0].level == 0
+    silent = bench.now + SILENCE + 0.1
+    (old,) = bench.watch.aged(silent)
+    assert (old.level, old.message) == (STALE, 'unknown for 1 s; before: enabled')
+    bench.now = silent
+    bench.watch.take_statuses(DiagnosticArray(status=[good]))
+    assert bench.watch.aged(silent + 0.1)[0].level == 0
 
 
 ON = {'state': 'Operation enabled', 'mode': 'Cyclic position', 'online': 'True'}

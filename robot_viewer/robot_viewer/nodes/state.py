@@ -105,11 +105,13 @@ class Watch:
         return legs_of(self.statuses.values())
 
     def aged(self, now: float) -> list[Status]:
-        """Return all statuses; overdue ones become stale."""
+        """Return all statuses; overdue ones, and those from before a silence, become stale."""
         found = []
+        silence = now - self.joints_at if self.joints_at is not None else 0.0
+        oldest = min(STATUS_AGE, silence) if silence > SILENCE else STATUS_AGE
         for name, status in self.statuses.items():
             age = now - self._times[name]
-            if age >= STATUS_AGE:
+            if age >= oldest:
                 text = f'unknown for {age:.0f} s; before: {status.message}'
                 status = replace(status, level=STALE, message=text)  # noqa: PLW2901
             found.append(status)

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from urdf_reader import Joint, JointKind, KinematicTree
 from viser import (
     GuiApi,
+    GuiButtonHandle,
     GuiDropdownHandle,
     GuiEvent,
     GuiFolderHandle,
@@ -116,6 +117,7 @@ class JogPanel:
         self._gui, self._robot = gui, robot
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
         self.target: TargetPanel | None = None
+        self._grips: list[GuiButtonHandle] = []
         with place(self):
             tabs = self._gui.add_tab_group()
             self._tabs = {
@@ -151,6 +153,11 @@ class JogPanel:
         with tab.content:
             add(offered)
 
+    def permit(self, allowed: bool) -> None:
+        """Enable the buttons that move a gripper by one press."""
+        for button in self._grips:
+            button.disabled = not allowed
+
     def remove(self) -> None:
         """Remove the target from the scene; the page removes the groups."""
         if self.target is not None:
@@ -173,6 +180,7 @@ class JogPanel:
         self.target = TargetPanel(self._gui, self._robot, joints, ways)
 
     def _add_grippers(self, grippers: Sequence[tuple[str, str]]) -> None:
+        self._grips = []
         for gripper, joint in grippers:
             self._add_gripper(gripper, self._joints[joint])
         if not grippers:
@@ -236,7 +244,8 @@ class JogPanel:
                 ('Close gripper', lambda: low),
                 ('Move to width', lambda: value_of(width) / size),
             ):
-                add_button(self._gui, label, partial(self._grip, label, gripper, position))
+                press = partial(self._grip, label, gripper, position)
+                self._grips.append(add_button(self._gui, label, press))
 
     def _grip(self, label: str, gripper: str, position: Callable[[], float]) -> None:
         if not self._live.refuses(label):

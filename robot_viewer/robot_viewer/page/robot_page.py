@@ -297,6 +297,8 @@ class RobotPage:
         for mode, button in self._modes.items():
             able = state.movable or (faulty and mode in IN_FAULT)
             button.disabled = not able or self.live.stopped
+        if self._jog is not None:
+            self._jog.permit(state.movable and not self.live.stopped)
         tree, speed = None if self.robot is None else self.robot.tree, ''
         if self.velocity is not None:
             what = 'Forward' if self.has('Body') else 'Tool'
