@@ -29,10 +29,7 @@ EXAMPLES = [
     ('(1700000000.123456) can0 181#27060000', Frame(0x181, b'\x27\x06\x00\x00')),
     ('(1700000000.123456) can0 080#', Frame(0x080)),
     ('(1700000000.123456) can0 701#R', Frame(0x701, is_remote=True)),
-    (
-        '(1700000000.123456) can0 701#R3',
-        Frame(0x701, is_remote=True, remote_length=3),
-    ),
+    ('(1700000000.123456) can0 701#R3', Frame(0x701, is_remote=True, remote_length=3)),
     ('(1700000000.123456) can0 00000181#01', Frame(0x181, b'\x01', is_extended=True)),
     ('(1700000000.123456) can0 20000004#0004', Frame(0x4, b'\x00\x04', is_error=True)),
     ('(1700000000.123456) can0 1FFFFFFF#R', Frame(0x1FFFFFFF, is_extended=True, is_remote=True)),
@@ -93,6 +90,7 @@ def test_every_format_keeps_frames_and_times(suffix: str, tmp_path: Path) -> Non
 
 TPDO = Frame(0x181, b'\x27\x06')
 LONG = Frame(0x18FF1234, b'\x01', is_extended=True)
+REQUEST = Frame(0x701, is_remote=True, remote_length=1)
 POSTED = {
     'candump -L': (
         '$ candump -L can0 can1\n(1.500000) can0 181#2706\n(2.500000) can1 18FF1234#01\n',
@@ -103,11 +101,7 @@ POSTED = {
             '  can0  181   [2]  27 06\n\n  can1  18FF1234   [1]  01\n'
             '  can0  701   [1]  remote request\n'
         ),
-        [
-            ('can0', TPDO, 0.0),
-            ('can1', LONG, 0.0),
-            ('can0', Frame(0x701, is_remote=True, remote_length=1), 0.0),
-        ],
+        [('can0', TPDO, 0.0), ('can1', LONG, 0.0), ('can0', REQUEST, 0.0)],
     ),
     'candump -t z -a, in colours': (
         (
@@ -141,11 +135,7 @@ POSTED = {
             '     2)      2500.0  Tx     18FF1234  1  01 \n'
             '     3)      3500.0  Rx         0701  1  RTR \n'
         ),
-        [
-            ('1', TPDO, 1.5),
-            ('1', LONG, 2.5),
-            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
-        ],
+        [('1', TPDO, 1.5), ('1', LONG, 2.5), ('1', REQUEST, 3.5)],
     ),
     'PCAN 2.1': (
         (
@@ -176,10 +166,8 @@ POSTED = {
             '   4.500000 1  ErrorFrame\nEnd TriggerBlock\n'
         ),
         [
-            ('1', TPDO, 1.5),
-            ('2', LONG, 2.5),
-            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
-            ('1', Frame(0, is_error=True), 4.5),
+            *(('1', TPDO, 1.5), ('2', LONG, 2.5)),
+            *(('1', REQUEST, 3.5), ('1', Frame(0, is_error=True), 4.5)),
         ],
     ),
     'Vector, relative': (
@@ -209,10 +197,7 @@ def utc() -> Iterator[None]:
 @pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
 @pytest.mark.parametrize(('text', 'expected'), POSTED.values(), ids=POSTED)
 def test_logs_are_read_as_people_post_them(
-    text: str,
-    expected: list[tuple[str, Frame, float]],
-    encoding: str,
-    tmp_path: Path,
+    text: str, expected: list[tuple[str, Frame, float]], encoding: str, tmp_path: Path
 ) -> None:
     """Whatever they are called: the buses, the times, and remote requests with their length."""
     path = tmp_path / 'posted.txt'
@@ -305,13 +290,6 @@ def test_a_pause_between_two_clocks_does_not_move_a_log(monkeypatch: pytest.Monk
     assert bus.wall_clock_offset() == pytest.approx(1.7e9, abs=1e-3)
 
 
-@pytest.mark.parametrize('suffix', ['.pcap', '.cap', '.pcapng'])
-def test_captures_are_not_written(suffix: str, tmp_path: Path) -> None:
-    """Wireshark opens logs of candump."""
-    with pytest.raises(CodecError, match='no capture is written'):
-        written([], tmp_path, f'bus{suffix}')
-
-
 @pytest.mark.skipif(shutil.which('tshark') is None, reason='needs tshark, of Wireshark')
 def test_wireshark_reads_our_logs_as_canopen(tmp_path: Path) -> None:
     """With the dissector that is chosen as the README says."""
@@ -352,46 +330,30 @@ def test_we_read_logs_of_python_can(frame: Frame) -> None:
     assert found.frame == frame._replace(timestamp=1.5, remote_length=0)  # which it leaves out
 
 
-@pytest.mark.parametrize(
-    ('bus', 'channel'),
-    [
-        ('can0', 'can0'),
-        ('vcan12', 'vcan12'),
-        ('udp_multicast:239.1.2.3', 'vcan0'),
-        ('a b', 'vcan0'),
-    ],
-)
-def test_the_channel_is_a_name_that_canplayer_can_play_to(bus: str, channel: str) -> None:
-    """A log of the multicast bus can be played to vcan0."""
-    assert log_channel(bus) == channel
+WRONG = ['181', '1#00', '0181#00', '181#0', '181#zz', '181#000102030405060708', '181##100']
+WRONG += ['9FFFFFFF#00', 'FFF#00']
 
 
-@pytest.mark.parametrize(
-    'line',
-    [
-        '(1.0) can0 181',
-        '(1.0) can0 1#00',
-        '(1.0) can0 0181#00',
-        '(1.0) can0 181#0',
-        '(1.0) can0 181#zz',
-        '(1.0) can0 181#000102030405060708',
-        '(1.0) can0 181##100',
-        '(1.0) can0 9FFFFFFF#00',
-        '(1.0) can0 FFF#00',
-        '(1) can0 181#00',
-        '(1.0) 181#00',
-    ],
-)
-def test_wrong_lines_are_named_with_their_number(line: str) -> None:
-    """A damaged or CAN FD line is refused, telling where."""
-    with pytest.raises(CodecError, match='line 3: '):
-        list(read_lines(['# a comment', '', line]))
+def test_wrong_lines_are_named_with_their_number() -> None:
+    """A damaged or CAN FD line is refused, telling where.
+
+    Dots between bytes, more blanks and a direction mean nothing, as to can-utils.
+    """
+    for line in ('(1) can0 181#00', '(1.0) 181#00', *(f'(1.0) can0 {frame}' for frame in WRONG)):
+        with pytest.raises(CodecError, match='line 3: '):
+            list(read_lines(['# a comment', '', line]))
+    for line in ('(1.0) can0 181#01.02.03', '(1.0)  can0\t181#010203 R\n'):
+        assert parse_line(line).frame == Frame(0x181, b'\x01\x02\x03', 1.0)
 
 
-@pytest.mark.parametrize('line', ['(1.0) can0 181#01.02.03', '(1.0)  can0\t181#010203 R\n'])
-def test_what_can_utils_tolerates_is_tolerated(line: str) -> None:
-    """Dots between bytes, more blanks and a direction mean nothing."""
-    assert parse_line(line).frame == Frame(0x181, b'\x01\x02\x03', 1.0)
+def test_only_what_canplayer_can_play_is_written(tmp_path: Path) -> None:
+    """A log of the multicast bus can be played to vcan0; Wireshark opens logs of candump."""
+    channels = {'can0': 'can0', 'vcan12': 'vcan12', 'udp_multicast:239.1.2.3': 'vcan0'}
+    for name, channel in (channels | {'a b': 'vcan0'}).items():
+        assert log_channel(name) == channel
+    for suffix in ('.pcap', '.cap', '.pcapng'):
+        with pytest.raises(CodecError, match='no capture is written'):
+            written([], tmp_path, f'bus{suffix}')
 
 
 @pytest.mark.skipif(shutil.which('log2asc') is None, reason='can-utils is not installed')
@@ -400,13 +362,8 @@ def test_log2asc_of_can_utils_converts_our_logs(tmp_path: Path) -> None:
     path = written(
         [frame._replace(timestamp=float(n)) for n, (_, frame) in enumerate(EXAMPLES)], tmp_path
     )
-    converted = subprocess.run(
-        ['log2asc', '-I', str(path), 'can0'],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
+    command = ['log2asc', '-I', str(path), 'can0']
+    converted = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     lines = [line for line in converted.stdout.splitlines() if ' 1  ' in line]
     assert len(lines) == len(EXAMPLES)
     assert '181' in lines[0]

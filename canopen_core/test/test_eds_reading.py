@@ -132,6 +132,7 @@ def test_oddities_are_warnings_with_their_line(
 
 
 ARRAY = f'[2000]|ObjectType=8|{NUMBER}|DefaultValue=7|CompactSubObj=3'
+DERIVED = f'[A0sub1]|{NUMBER}|DefaultValue=6|[2000]|DataType=0xA0|AccessType=rw|DefaultValue=300'
 VALUES: list[tuple[str, str, int, Value | None]] = [
     ('compact default', ARRAY, 3, 7),
     ('compact count', ARRAY, 0, 3),
@@ -141,27 +142,16 @@ VALUES: list[tuple[str, str, int, Value | None]] = [
     ('bad DCF value', f'[2000]|{NUMBER}|DefaultValue=7|ParameterValue=bad', 0, 7),
     ('domain', '[2000]|ObjectType=2|AccessType=rw|DefaultValue=0x1234', 0, None),
     ("two's complement", '[2000]|DataType=2|AccessType=rw|DefaultValue=0xFF', 0, -1),
-    (
-        'derived type',
-        f'[A0sub1]|{NUMBER}|DefaultValue=6|[2000]|DataType=0xA0|AccessType=rw|DefaultValue=300',
-        0,
-        300,
-    ),
+    ('derived type', DERIVED, 0, 300),
 ]
 
 
-@pytest.mark.parametrize(
-    ('text', 'subindex', 'value'),
-    [case[1:] for case in VALUES],
-    ids=[case[0] for case in VALUES],
-)
-def test_values_after_a_reset(
-    tmp_path: Path, text: str, subindex: int, value: Value | None
-) -> None:
+def test_values_after_a_reset(tmp_path: Path) -> None:
     """Compact arrays, DCF values and special types give the value that the device starts with."""
-    entry = read(tmp_path, text.replace('|', '\n')).dictionary.get(0x2000, subindex)
-    assert entry is not None
-    assert entry.default == value
+    for case, text, subindex, value in VALUES:
+        entry = read(tmp_path, text.replace('|', '\n')).dictionary.get(0x2000, subindex)
+        assert entry is not None, case
+        assert entry.default == value, case
 
 
 COMPACT_PDOS = """
@@ -189,7 +179,10 @@ DefaultValue=0x80000000
 
 
 def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
-    """By their number and the mask of sub-indices; what has a section keeps it."""
+    """By their number and the mask of sub-indices; what has a section keeps it.
+
+    Of a compact array [2000Name] names single elements, the others are numbered.
+    """
     eds = read(tmp_path, COMPACT_PDOS)
     dictionary = eds.dictionary.for_node(3)
     assert not [problem for problem in eds.warnings if 'without a section' in problem.message]
@@ -204,15 +197,11 @@ def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
     assert len(dictionary.subindices(0x1600)) == len(dictionary.subindices(0x1A00)) == 65
     assert not dictionary.has_index(0x1401)
     assert not dictionary.has_index(0x1805)
-
-
-def test_compact_arrays_are_named(tmp_path: Path) -> None:
-    """[2000Name] names single elements, the others are numbered."""
-    text = (
+    array = (
         '[2000]\nParameterName=Field\nObjectType=8\nDataType=5\nAccessType=rw\nCompactSubObj=2\n'
         '[2000Name]\nNrOfEntries=1\n2=Second'
     )
-    names = [entry.name for entry in read(tmp_path, text).dictionary.subindices(0x2000)]
+    names = [entry.name for entry in read(tmp_path, array).dictionary.subindices(0x2000)]
     assert names == ['NrOfObjects', 'Field1', 'Second']
 
 
@@ -260,82 +249,47 @@ def test_files_that_are_no_eds_are_refused(
         assert problem.remedy
 
 
-@pytest.mark.parametrize(
-    ('text', 'value'),
-    [
-        ('0', 0),
-        ('001', 1),
-        ('010', 10),  # decimal: vendors pad, nobody means octal
-        ('42', 42),
-        ('-3', -3),
-        ('+7', 7),
-        ('0x1A', 26),
-        ('0X1a', 26),
-        ('-0x10', -16),
-        ('0x6040 ; controlword', 0x6040),
-    ],
-)
-def test_whole_numbers(text: str, value: int) -> None:
-    """Decimal with or without padding, hexadecimal in any case, with a comment behind."""
-    assert parse_integer(text) == value
+WHOLE = {'0': 0, '001': 1, '010': 10, '42': 42, '-3': -3, '+7': 7, '0x1A': 26, '0X1a': 26}
+WHOLE |= {'-0x10': -16, '0x6040 ; controlword': 0x6040}
+"""Padded ones are decimal: vendors pad, nobody means octal."""
+NO_NUMBERS = ('', 'abc', '0x', '1.5', '1_000', '1 2', '--1', '9' * 50, '٣')
+SUMS = {
+    '$NODEID+0x180': 0x180,
+    '$nodeid + 0x180': 0x180,
+    '0x200+$NODEID': 0x200,
+    '$NODEID': 0,
+    '$NODEID+0x80000000+0x280': 0x8000_0280,
+    '$NODEID+384 ; TPDO 1': 384,
+}
+"""The node id stands on either side, in any case, with any blanks."""
+OTHERS: list[tuple[DataType, str, Value]] = [
+    (DataType.BOOLEAN, '1', 1),
+    (DataType.BOOLEAN, 'TRUE', True),
+    (DataType.BOOLEAN, 'false', False),
+    (DataType.VISIBLE_STRING, 'Drive; rev. 2', 'Drive; rev. 2'),
+    (DataType.OCTET_STRING, '0A 1B2c', b'\x0a\x1b\x2c'),
+    (DataType.UNICODE_STRING, '00410042', 'AB'),
+    (DataType.UNICODE_STRING, 'plain', 'plain'),
+    (DataType.TIME_DIFFERENCE, '1', b'\x01\0\0\0\0\0'),
+    (DataType.REAL32, '1.5 ; gain', 1.5),
+    (DataType.REAL64, '-2e-3', -0.002),
+]
 
 
-@pytest.mark.parametrize('text', ['', 'abc', '0x', '1.5', '1_000', '1 2', '--1', '9' * 50, '٣'])
-def test_what_is_no_number_is_refused(text: str) -> None:
-    """Nothing is guessed; the message shows the text."""
-    with pytest.raises(ValueError, match='not a whole number'):
-        parse_integer(text)
-
-
-@pytest.mark.parametrize(
-    ('text', 'expected'),
-    [
-        ('$NODEID+0x180', EdsValue(0x180, node_relative=True)),
-        ('$nodeid + 0x180', EdsValue(0x180, node_relative=True)),
-        ('0x200+$NODEID', EdsValue(0x200, node_relative=True)),
-        ('$NODEID', EdsValue(0, node_relative=True)),
-        ('$NODEID+0x80000000+0x280', EdsValue(0x8000_0280, node_relative=True)),
-        ('$NODEID+384 ; TPDO 1', EdsValue(384, node_relative=True)),
-    ],
-)
-def test_sums_with_the_node_id(text: str, expected: EdsValue) -> None:
-    """The node id stands on either side, in any case, with any blanks."""
-    assert parse_value(DataType.UNSIGNED32, text) == expected
-
-
-@pytest.mark.parametrize(
-    ('data_type', 'text', 'value'),
-    [
-        (DataType.BOOLEAN, '1', 1),
-        (DataType.BOOLEAN, 'TRUE', True),
-        (DataType.BOOLEAN, 'false', False),
-        (DataType.VISIBLE_STRING, 'Drive; rev. 2', 'Drive; rev. 2'),
-        (DataType.OCTET_STRING, '0A 1B2c', b'\x0a\x1b\x2c'),
-        (DataType.UNICODE_STRING, '00410042', 'AB'),
-        (DataType.UNICODE_STRING, 'plain', 'plain'),
-        (DataType.TIME_DIFFERENCE, '1', b'\x01\0\0\0\0\0'),
-        (DataType.REAL32, '1.5 ; gain', 1.5),
-        (DataType.REAL64, '-2e-3', -0.002),
-    ],
-)
-def test_other_types(data_type: DataType, text: str, value: Value) -> None:
-    """Booleans, strings, octets, times and reals, as files write them."""
-    assert parse_value(data_type, text) == EdsValue(value)
-
-
-@given(value=st.floats(width=32))
-def test_hexadecimal_reals_are_bits(value: float) -> None:
-    """A real in hexadecimal gives the bits of the number (CiA 306-1)."""
-    (bits,) = struct.unpack('<I', struct.pack('<f', value))
-    parsed = parse_value(DataType.REAL32, f'0x{bits:08X}')
-    assert parsed is not None
-    assert parsed.value == value or (math.isnan(value) and math.isnan(float(parsed.value)))
-
-
-@given(data_type=st.sampled_from(DataType))
-def test_an_empty_text_is_no_value(data_type: DataType) -> None:
-    """Empty keys are common and mean nothing."""
-    assert parse_value(data_type, '') is None
+def test_texts_are_values() -> None:
+    """As files write them; nothing is guessed, and empty keys are common and mean nothing."""
+    for text, number in WHOLE.items():
+        assert parse_integer(text) == number, text
+    for text in NO_NUMBERS:
+        with pytest.raises(ValueError, match='not a whole number'):
+            parse_integer(text)
+    for text, offset in SUMS.items():
+        found = parse_value(DataType.UNSIGNED32, text)
+        assert found == EdsValue(offset, node_relative=True), text
+    for data_type, text, value in OTHERS:
+        assert parse_value(data_type, text) == EdsValue(value), (data_type, text)
+    for data_type in DataType:
+        assert parse_value(data_type, '') is None
 
 
 TEXTS = st.one_of(
@@ -412,33 +366,22 @@ def test_both_readers_agree(eds_path: Path) -> None:
         assert describe(entry) == describe_peer(theirs[address]), entry
 
 
-def describe(entry: ObjectEntry) -> tuple[object, ...]:
+PEER_KEYS = ('name', 'data_type', 'access_type', 'pdo_mappable', 'default', 'min', 'max')
+
+
+def describe(entry: ObjectEntry) -> list[object]:
     """List what is compared."""
-    is_real = entry.data_type in REAL_FORMATS  # whose limits the peer reads as integers only
-    return (
-        entry.name,
-        entry.data_type.value,
-        entry.access.value,
-        entry.pdo_mappable,
-        entry.default,
-        None if is_real else entry.low_limit,
-        None if is_real else entry.high_limit,
-    )
+    kinds = [entry.name, entry.data_type.value, entry.access.value, entry.pdo_mappable]
+    limits = [entry.low_limit, entry.high_limit]
+    # of reals the peer reads limits as integers only
+    return [*kinds, entry.default, *([] if entry.data_type in REAL_FORMATS else limits)]
 
 
-def describe_peer(entry: object) -> tuple[object, ...]:
+def describe_peer(entry: object) -> list[object]:
     """List the same of the peer's entry."""
-    is_real = getattr(entry, 'data_type', 0) in [kind.value for kind in REAL_FORMATS]
-    default = getattr(entry, 'default', None)
-    return (
-        getattr(entry, 'name', None),
-        getattr(entry, 'data_type', None),
-        getattr(entry, 'access_type', None),
-        getattr(entry, 'pdo_mappable', None),
-        None if default in ('', b'') else default,
-        None if is_real else getattr(entry, 'min', None),
-        None if is_real else getattr(entry, 'max', None),
-    )
+    values = [getattr(entry, key, None) for key in PEER_KEYS]
+    values[4] = None if values[4] in ('', b'') else values[4]
+    return values[:5] if values[1] in [kind.value for kind in REAL_FORMATS] else values
 
 
 NUMBERS = [data_type for data_type in DataType if integer_range(data_type) is not None]
@@ -456,31 +399,30 @@ def test_numbers_come_back(data_type: DataType, data: st.DataObject) -> None:
         assert bytes_from_text(data_type, text) == raw
 
 
-@given(st.sampled_from(list(REAL_FORMATS)), st.floats(width=32, allow_nan=False))
+@given(st.sampled_from(list(REAL_FORMATS)), st.floats(width=32))
 def test_reals_come_back(data_type: DataType, value: float) -> None:
-    """Infinities and denormals too."""
+    """Infinities and denormals too, and as the bits in hexadecimal (CiA 306-1)."""
     raw = struct.pack(REAL_FORMATS[data_type], value)
-    assert bytes_from_text(data_type, text_from_bytes(data_type, raw)) == raw
+    shown = text_from_bytes(data_type, raw)
+    if math.isnan(value):
+        assert shown == 'nan'
+        return
+    bits = int.from_bytes(raw, 'little')
+    for text in (shown, f'0x{bits:0{2 * len(raw)}X}'):
+        assert bytes_from_text(data_type, text) == raw
 
 
-def test_nan_is_no_secret() -> None:
-    """It is shown as what it is."""
-    assert text_from_bytes(DataType.REAL32, struct.pack('<f', math.nan)) == 'nan'
+CHARACTERS = st.text(st.characters(max_codepoint=255), min_size=1)
 
 
-@given(st.sampled_from(sorted(BYTE_TYPES)), st.binary(min_size=6, max_size=6))
-def test_bytes_come_back(data_type: DataType, raw: bytes) -> None:
-    """As hexadecimal digits, with or without spaces."""
+@given(st.sampled_from(sorted(BYTE_TYPES)), st.binary(min_size=6, max_size=6), CHARACTERS)
+def test_bytes_and_strings_come_back(data_type: DataType, raw: bytes, string: str) -> None:
+    """Hexadecimal digits with or without spaces; every character of a VISIBLE_STRING."""
     text = text_from_bytes(data_type, raw)
     assert bytes_from_text(data_type, text) == raw
     assert bytes_from_text(data_type, text.replace(' ', '')) == raw
-
-
-@given(st.text(st.characters(max_codepoint=255), min_size=1))
-def test_strings_come_back(text: str) -> None:
-    """Every character that a VISIBLE_STRING of a real device may have."""
-    raw = bytes_from_text(DataType.VISIBLE_STRING, text)
-    assert text_from_bytes(DataType.VISIBLE_STRING, raw) == text
+    encoded = bytes_from_text(DataType.VISIBLE_STRING, string)
+    assert text_from_bytes(DataType.VISIBLE_STRING, encoded) == string
 
 
 @pytest.mark.parametrize(
