@@ -25,10 +25,11 @@ from std_srvs.srv import SetBool
 
 from node_runner import LATCHED, ParameterError
 from quad_description import FEET, movable_joints, Pose, pose_positions, robot_urdf
-from quad_hardware import HardwareError
+from quad_hardware import CommandError, HardwareError
 from quad_hardware.joints import LimiterSettings, MAX_PERIOD
+from quad_hardware.nodes import parameters
 from quad_hardware.nodes.hardware_node import HardwareNode
-from quad_hardware.nodes.parameters import declare_parameters, NodeSettings
+from quad_hardware.nodes.parameters import NodeSettings
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_msgs.msg import FootContacts
 from quad_node_rig import NodeRig, TIMEOUT
@@ -46,13 +47,14 @@ WRONG = {
 }
 
 
-def read(argument: str) -> NodeSettings:
-    """What the node understands of a parameter on its command line."""
+def read(*arguments: str) -> NodeSettings:
+    """What the node understands of parameters on its command line."""
     context = Context()
-    rclpy.init(args=['--ros-args', '-p', argument], context=context)
+    words = [word for argument in arguments for word in ('-p', argument)]
+    rclpy.init(args=['--ros-args', *words], context=context)
     node = Node('hardware_node', context=context, enable_rosout=False)
     try:
-        return declare_parameters(node)
+        return parameters.declare_parameters(node)
     finally:
         node.destroy_node()
         rclpy.shutdown(context=context)
@@ -63,6 +65,33 @@ def test_a_wrong_parameter_is_refused(argument: str, reason: str) -> None:
     """The message names the value and the remedy."""
     with pytest.raises((ParameterError, HardwareError), match=re.escape(reason)):
         read(argument)
+
+
+METHOD = 'vendor_servo_method:=write_servo_angle'
+
+
+@pytest.mark.parametrize(
+    ('installed', 'arguments', 'vendor'),
+    [
+        (False, (), False),
+        (True, ('protocol:=v2',), False),
+        (True, ('protocol:=v1',), False),
+        (True, ('protocol:=vendor', METHOD), True),
+        (True, (), 'set protocol'),
+        (True, ('protocol:=vendor',), 'vendor_servo_method'),
+        (False, ('protocol:=vendor', METHOD), 'protocol'),
+    ],
+)
+def test_the_vendors_library_is_used_when_it_was_chosen(
+    monkeypatch: pytest.MonkeyPatch, *, installed: bool, arguments: tuple[str, ...], vendor: object
+) -> None:
+    """What would have to be guessed is refused before the port is opened, by its parameter."""
+    monkeypatch.setattr(parameters, 'is_installed', lambda: installed)
+    if isinstance(vendor, str):
+        with pytest.raises(CommandError, match=vendor):
+            read(*arguments)
+    else:
+        assert read(*arguments).robot.link.vendor is vendor
 
 
 def on_node(test: Callable[..., None]) -> Callable[..., None]:
@@ -153,21 +182,16 @@ def test_with_a_dead_imu_the_joints_are_reported_and_follow(rig: NodeRig) -> Non
 
 
 @on_node
-def test_beyond_limits_is_taken_to_them_and_reported(rig: NodeRig) -> None:
-    """The servo ends at the limit of the URDF."""
+def test_limits_of_the_urdf_count_and_a_servo_beyond_them_is_left_there(rig: NodeRig) -> None:
+    """A target beyond ends at the limit; a stream that asks a servo to stay sends where it is."""
     rig.stream([2.0, 0.0, 0.0] * 4, 1.0)
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'fl_hip_joint')
     assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
-
-
-@on_node
-def test_a_servo_beyond_its_limits_is_left_there_and_reported(rig: NodeRig) -> None:
-    """A stream that asks it to stay sends exactly where it is."""
+    rig.begin_anew()
     rig.peer.angles[13] = 40.0
-    rig.receive('/joint_states', 30)  # by then the stream of another test has ended
-    found = [math.radians(40.0), *HOME[1:]]
+    rig.receive('/joint_states', 30)  # by then the stream of before has ended
     rig.peer.commands.clear()
-    rig.stream(found, 0.3)
+    rig.stream([math.radians(40.0), *HOME[1:]], 0.3)
     assert {command[13] for command in rig.peer.commands} == {40.0}
     status = rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'found beyond limits')
     assert 'fl_hip_joint' in status.message
@@ -264,21 +288,11 @@ def test_a_node_that_ends_in_motion_folds_the_legs_first(
         )
 
 
-@on_node
-@pytest.mark.parametrize('commanded', [True, False])
-def test_a_timer_that_waited_behind_a_command_counts_nothing(*, commanded: bool) -> None:
-    """It goes on, for the end of the commands that may come."""
-    said: list[str] = []
-    robot = SimpleNamespace(is_commanded=commanded, miss_commands=lambda: 'lies down')
-    timer = SimpleNamespace(
-        cancel=lambda: said.append('ended'), reset=lambda: said.append('begun')
-    )
-    log = SimpleNamespace(error=said.append)
-    node: Any = SimpleNamespace(
-        _robot=robot, _silence=timer, _descent=timer, get_logger=lambda: log
-    )
+def test_a_timer_that_waited_behind_a_command_counts_nothing() -> None:
+    """A command came while its event waited for the executor."""
+    robot = SimpleNamespace(is_commanded=True, miss_commands=lambda: pytest.fail('it counted'))
+    node: Any = SimpleNamespace(_robot=robot)
     HardwareNode._miss_commands(node)
-    assert said == ([] if commanded else ['ended', 'lies down', 'begun'])
 
 
 @on_node
@@ -314,35 +328,26 @@ def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig
 
 
 @on_node
-def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
-    """Without torque no command is sent; with it, the servos hold where they were put."""
-    answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
-    assert (answer.success, answer.message) == (True, 'the servos are without torque')
-    rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
-    rig.command(HOME)
-    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'without torque')
-    assert rig.peer.commands == []
-    rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-    rig.receive_position(math.radians(20.0))
-    assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
-    rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
-    assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
-
-
-@on_node
 def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) -> None:
-    """Its targets are those of a robot that stood; after a stall, too, until they are near."""
+    """Without torque no command is sent; with it, the servos hold where they were put.
+
+    The targets of the stream are those of a robot that stood; after a stall, too, until they are
+    near.
+    """
     rig.stream(HOME, 0.5)
 
     def give(on: bool) -> SetBool.Response:
         return rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=on))
 
     timer = rig.client.node.create_timer(0.02, lambda: rig.command(HOME))
-    assert give(False).success
+    answer = give(False)
+    assert (answer.success, answer.message) == (True, 'the servos are without torque')
     rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
+    before = len(rig.peer.commands)
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'without torque')
     rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
     rig.receive_position(math.radians(20.0))
-    before = len(rig.peer.commands)
+    assert len(rig.peer.commands) == before
     assert give(True).success
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'set the mode relax, then stand')

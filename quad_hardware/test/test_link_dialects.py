@@ -15,12 +15,9 @@ from types import SimpleNamespace
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-import rclpy
-from rclpy.context import Context
-from rclpy.node import Node
 from xgo_lib2 import feedback
 
-from quad_hardware import CommandError, LinkError
+from quad_hardware import LinkError
 from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState
 from quad_hardware.link.dialects import (
     HOST_GAP,
@@ -31,7 +28,6 @@ from quad_hardware.link.dialects import (
     V2Dialect,
 )
 from quad_hardware.link.open import open_session
-from quad_hardware.nodes import parameters
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -105,64 +101,16 @@ def test_the_library_does_the_talking(
 
 @pytest.mark.parametrize('method', ['', 'spin', '_send'])
 def test_a_method_that_is_not_there_is_refused(peer: PtyPeer, method: str) -> None:
-    """The message names the parameter, and the methods that there are; nothing is guessed."""
+    """The message names the parameter, and the methods that there are; nothing is guessed.
+
+    Nor is another way tried where the library finds no robot.
+    """
     with pytest.raises(LinkError, match=f'vendor_servo_method.*{METHOD}'):
         open_session(LinkOptions(str(peer.link), (), vendor=True, vendor_method=method))
     assert peer.commands == []
-
-
-def test_no_other_way_is_tried(tmp_path: Path) -> None:
-    """Where the library finds no robot, nobody else looks for one."""
-    options = LinkOptions(str(tmp_path / 'none'), (V2,), vendor=True, vendor_method=METHOD)
+    options = LinkOptions(f'{peer.link}-none', (V2,), vendor=True, vendor_method=METHOD)
     with pytest.raises(LinkError, match='xgo_lib2 cannot open'):
         open_session(options)
-
-
-def declare(*overrides: str) -> LinkOptions:
-    """Declare the parameters of hardware_node with some of them set."""
-    context = Context()
-    words = [word for override in overrides for word in ('-p', override)]
-    rclpy.init(args=['--ros-args', *words], context=context)
-    node = Node('hardware_node', context=context, enable_rosout=False)
-    try:
-        return parameters.declare_parameters(node).robot.link
-    finally:
-        node.destroy_node()  # type: ignore[no-untyped-call]
-        rclpy.shutdown(context=context)
-
-
-@pytest.mark.parametrize(
-    ('installed', 'overrides', 'named'),
-    [
-        (True, (), 'set protocol'),
-        (True, ('protocol:=vendor',), 'vendor_servo_method'),
-        (False, ('protocol:=vendor', f'vendor_servo_method:={METHOD}'), 'protocol'),
-    ],
-)
-def test_what_would_have_to_be_guessed_is_refused(
-    monkeypatch: pytest.MonkeyPatch, *, installed: bool, overrides: tuple[str, ...], named: str
-) -> None:
-    """Before the port is opened, and the message names the parameter."""
-    monkeypatch.setattr(parameters, 'is_installed', lambda: installed)
-    with pytest.raises(CommandError, match=named):
-        declare(*overrides)
-
-
-@pytest.mark.parametrize(
-    ('installed', 'overrides', 'vendor'),
-    [
-        (False, (), False),
-        (True, ('protocol:=v2',), False),
-        (True, ('protocol:=v1',), False),
-        (True, ('protocol:=vendor', f'vendor_servo_method:={METHOD}'), True),
-    ],
-)
-def test_what_is_said_is_done(
-    monkeypatch: pytest.MonkeyPatch, *, installed: bool, overrides: tuple[str, ...], vendor: bool
-) -> None:
-    """Through the library when it was chosen, and without it otherwise."""
-    monkeypatch.setattr(parameters, 'is_installed', lambda: installed)
-    assert declare(*overrides).vendor is vendor
 
 
 LEGS = dict.fromkeys(LEG_MOTORS, 10.0)
@@ -232,8 +180,11 @@ def test_the_angles_of_a_report_are_older_than_its_attitude(latency: float) -> N
         assert state.joints_age > latency
 
 
-def test_the_old_protocol_is_polled_at_50_hz() -> None:
-    """Two bulk reads a period, and a report for each; the battery comes now and then."""
+def test_the_old_protocol_is_polled_and_commanded_at_50_hz() -> None:
+    """Two bulk reads a period, and a report for each; the battery comes now and then.
+
+    Twelve servos go in one frame each period beside them, and the gap is kept.
+    """
     rig = OldRig()
     rig.run(1.0)
     addresses = [frame.address for _, frame in rig.sent]
@@ -245,11 +196,6 @@ def test_the_old_protocol_is_polled_at_50_hz() -> None:
     assert state.rates == pytest.approx((0, 0, 10.0), abs=0.04)
     assert state.battery == 128.0
     assert set(state.positions) == set(BULK_READ_ORDER)
-
-
-def test_commands_of_the_old_protocol_fit_into_50_hz() -> None:
-    """Twelve servos in one frame each period; the reads go on, and the gap is kept."""
-    rig = OldRig()
     for _ in range(50):
         rig.dialect.command(LEGS)
         rig.run(0.02)
@@ -259,42 +205,27 @@ def test_commands_of_the_old_protocol_fit_into_50_hz() -> None:
     assert len(writes) == 50
     assert {len(frame.payload) for frame in writes} == {12}
     assert writes[0].payload[0] == span.encode(10.0)
-    assert len(rig.states) >= 49
+    assert len(rig.states) >= 99
     for (t0, frame), (t1, _) in zip(rig.sent, rig.sent[1:], strict=False):
         wire = V1.wire_time(len(frame.encode(V1)))
         assert t1 - t0 >= wire + HOST_GAP - 1e-9
 
 
-def test_an_arm_joint_is_sent_when_it_changes() -> None:
-    """Registers of their own, one frame each, and not again for the same angle."""
-    rig = OldRig()
-    for _ in range(5):
-        rig.dialect.command({**LEGS, 52: 20.0})
-        rig.run(0.02)
-    arm = [frame for _, frame in rig.sent if frame.address == 0x5D]
-    assert [frame.payload[0] for frame in arm] == [ANGLE_SPANS[Model.LITE][52].encode(20.0)]
-
-
-def arm_writes(rig: OldRig) -> int:
-    """How often the elbow was sent."""
-    return sum(frame.address == 0x5D for _, frame in rig.sent)
-
-
-def test_an_arm_joint_is_sent_again_for_a_frame_may_be_lost() -> None:
+def test_an_arm_joint_is_sent_when_it_changes_and_again_for_a_frame_may_be_lost() -> None:
     """Twice a second while commands come, and at once after silence or a change of torque."""
     rig = OldRig()
-    for _ in range(100):
+    sent: list[int] = []  # how often after each command
+    forget = {
+        100: rig.dialect.cancel_pending,
+        101: partial(rig.dialect.torque, on=False),
+    }
+    for count in range(102):
+        forget.get(count, lambda: None)()
         rig.dialect.command({**LEGS, 52: 20.0})
         rig.run(0.02)
-    assert arm_writes(rig) == 4
-    for count, forget in (
-        (5, rig.dialect.cancel_pending),
-        (6, partial(rig.dialect.torque, on=False)),
-    ):
-        forget()
-        rig.dialect.command({**LEGS, 52: 20.0})
-        rig.run(0.02)
-        assert arm_writes(rig) == count
+        sent.append(len(writes_to(rig, 0x5D)))
+    assert (sent[0], sent[4], *sent[99:]) == (1, 1, 4, 5, 6)
+    assert set(writes_to(rig, 0x5D)) == {(0x5D, ANGLE_SPANS[Model.LITE][52].encode(20.0))}
 
 
 def writes_to(rig: OldRig, *registers: int) -> list[tuple[int, int]]:
@@ -352,30 +283,32 @@ def test_an_unseen_servo_has_arrived_only_when_it_has(
     assert servo.arrived(now + 350.0 / MIN_RATE)
 
 
-def test_a_silent_old_robot_is_asked_again_and_counted() -> None:
-    """No answer ends a request after its time; nothing waits for ever, no report is made up."""
-    rig = OldRig(latency=math.inf)
-    rig.run(1.0)
-    assert rig.states == []
-    assert 10 <= rig.dialect.counters.unanswered <= 50
+@pytest.mark.parametrize(
+    ('latency', 'lose_each', 'reports', 'unanswered'),
+    [
+        (0.0, 0, 50, (0, 0)),
+        (0.006, 0, 48, (0, 0)),
+        (0.02, 0, 18, (0, 0)),
+        (0.045, 0, 9, (0, 0)),
+        (0.001, 10, 35, (1, 20)),
+        (math.inf, 0, 0, (10, 50)),
+    ],
+)
+def test_a_slow_board_makes_the_reports_fewer(
+    latency: float, lose_each: int, reports: int, unanswered: tuple[int, int]
+) -> None:
+    """However slow it answers, reports come in each second, and no answer is given up.
 
-
-@pytest.mark.parametrize(('latency', 'least'), [(0.0, 50), (0.006, 48), (0.02, 18), (0.045, 9)])
-def test_a_slow_board_makes_the_reports_fewer(latency: float, least: int) -> None:
-    """However slow it answers, reports come, and no answer is given up."""
+    One that is lost costs little on a quick board; a silent one is asked again, and none is made.
+    """
     rig = OldRig(latency)
-    rig.run(1.0)
-    assert len(rig.states) >= least
-    assert rig.dialect.counters.unanswered == 0
-
-
-def test_a_lost_answer_costs_little_on_a_quick_board() -> None:
-    """One answer in ten is lost: most periods still give a report."""
-    rig = OldRig(0.001)
-    rig.run(1.0)
-    rig.lose_each = 10
-    rig.run(2.0)
-    assert len(rig.states) >= 50 + 70
+    for _ in range(2):
+        before, rig.dialect.counters.unanswered = len(rig.states), 0
+        rig.run(1.0)
+        assert len(rig.states) - before >= reports
+        assert bool(rig.states) is (latency < math.inf)
+        rig.lose_each, (least, most) = lose_each, unanswered
+    assert least <= rig.dialect.counters.unanswered <= most
 
 
 def test_half_a_report_is_no_report() -> None:
