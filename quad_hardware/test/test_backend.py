@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+import json
 import math
 from pathlib import Path
 from statistics import median
@@ -34,20 +36,19 @@ from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
 
 URDF = robot_urdf('lite')
+JOINTS = JointMap(map(servo_of, movable_joints(URDF)))
+POSE = pose_positions(Pose.STAND)
+STAND = [POSE[name] for name in JOINTS.names]
 STANDING = (0.0, 0.6, -0.3) * 4
 LIFTED = (0.0, 0.9, -0.9)  # of a leg in the air
 TIMEOUT = 30.0  # [s] for a report, on a busy machine
 
 
-def settings_at(port: Path, log: Path) -> RobotSettings:
-    """Return a robot whose bytes are written to a log."""
-    return RobotSettings(
-        LinkOptions(str(port)),
-        URDF,
-        JointMap(map(servo_of, movable_joints(URDF))),
-        estimator=EstimatorSettings(mounting=ImuMounting(checked=True, rates_checked=True)),
-        serial_log=log,
-    )
+def settings_at(port: Path, log: Path | None = None) -> RobotSettings:
+    """Return a robot whose bytes are written to a log, if there is one."""
+    mounting = ImuMounting(checked=log is not None, rates_checked=log is not None)
+    estimator = EstimatorSettings(mounting=mounting)
+    return RobotSettings(LinkOptions(str(port)), URDF, JOINTS, estimator=estimator, serial_log=log)
 
 
 class Seen(NamedTuple):
@@ -147,26 +148,19 @@ def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkStat
 
 @pytest.mark.xdist_group('replayed_robot')
 @pytest.mark.slow
-def test_commands_and_feet_that_stand_are_those_of_the_robot(
+def test_commands_feet_and_link_are_those_of_the_robot(
     recorded: tuple[Protocol, Path, Seen],
 ) -> None:
-    """Each command of the log counts."""
-    _, log, live = recorded
-    _, _, replayed = fed(log)
+    """Each command of the log counts; after the last entry the reports become old.
+
+    A second turn begins anew.
+    """
+    protocol, log, live = recorded
+    robot, changes, replayed = fed(log, pause=2.0)
     assert replayed.commands == live.commands
     assert live.commands >= 40
     assert replayed.contact_ratios() == pytest.approx(live.contact_ratios(), abs=0.1)
     assert max(live.contact_ratios()) < 1.0
-
-
-@pytest.mark.xdist_group('replayed_robot')
-@pytest.mark.slow
-def test_status_is_that_of_the_link_and_a_second_turn_begins_anew(
-    recorded: tuple[Protocol, Path, Seen],
-) -> None:
-    """Protocol, firmware, counters, age; after the last entry the reports become old."""
-    protocol, log, live = recorded
-    robot, changes, replayed = fed(log, pause=2.0)
     status = robot.status()
     assert changes[0] is LinkState.WAITING
     assert LinkState.RUNNING in changes
@@ -197,22 +191,14 @@ def test_a_log_that_shows_no_robot_is_refused(
 ) -> None:
     """With what is missing in it."""
     path = tmp_path / 'cut.log'
-    text = ''
-    for line in lines:
-        kind, _, protocol = line.partition(' ')
-        opened = (
-            f'open {{"port": "p", "baud": 1, "protocol": "{protocol or "v2"}", "firmware": "L", '
-            '"model": null}'
-        )
-        text += f'(1.000000) {opened if kind == "open" else line}\n'
-    path.write_text(text)
+    opened = {'port': 'p', 'baud': 1, 'firmware': 'L', 'model': None}
+    with path.open('w') as log:
+        for line in lines:
+            kind, _, protocol = line.partition(' ')
+            entry = json.dumps({**opened, 'protocol': protocol or 'v2'})
+            log.write(f'(1.000000) {f"open {entry}" if kind == "open" else line}\n')
     with pytest.raises(RecordingError, match=reason):
         recorded_in(path, URDF)
-
-
-JOINTS = JointMap(map(servo_of, movable_joints(URDF)))
-POSE = pose_positions(Pose.STAND)
-STAND = [POSE[name] for name in JOINTS.names]
 
 
 @pytest.fixture(params=[V2, V1], ids=lambda protocol: protocol.name)
@@ -225,7 +211,7 @@ def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PtyPeer]:
 
 def backend_of(peer: PtyPeer) -> SerialBackend:
     """A back end for it."""
-    return SerialBackend(RobotSettings(LinkOptions(str(peer.link)), URDF, JOINTS))
+    return SerialBackend(settings_at(peer.link))
 
 
 def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
@@ -251,7 +237,7 @@ def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
 @pytest.mark.parametrize('peer', [V2], indirect=True)
 def test_commands_that_could_not_leave_add_up_to_no_jump(peer: PtyPeer) -> None:
     """A computer that holds up only the thread of the line sends the newest, one step on."""
-    robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), URDF, JOINTS))
+    robot = SerialRobot(settings_at(peer.link))
     robot.start()
     deadline = time.monotonic() + 10.0
     try:
@@ -301,31 +287,28 @@ def test_a_program_that_stops_stepping_leaves_no_leg_in_the_air(peer: PtyPeer) -
 
 def test_a_robot_that_is_lost_is_reported(peer: PtyPeer) -> None:
     """By the step that waits for its report."""
-
-    def step_for_ever() -> None:
-        while True:
-            backend.step(None)
-
     with backend_of(peer) as backend:
         backend.reset()
         peer.behaviour.silent = True
         with pytest.raises(NoAnswerError):
-            step_for_ever()
+            deque(iter(lambda: backend.step(None), None), maxlen=0)
 
 
-def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(tmp_path: Path) -> None:
+def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """93 of 109 degrees of a mini: the clamp is reported. As a lite it is not commanded."""
     urdf = robot_urdf('mini')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     beyond = [1.9 if name == 'fl_thigh_joint' else q for name, q in POSE.items()]
+    monkeypatch.setattr('quad_hardware.backend.CONNECT_TIME', 2.0)
     with PtyPeer(tmp_path / 'port', V1, firmware='M-4.3.3') as peer:
-        link = LinkOptions(str(peer.link))
         with (
-            SerialBackend(RobotSettings(link, URDF, JOINTS)) as other,
+            backend_of(peer) as other,
             pytest.raises(NoAnswerError, match='start with preset mini'),
         ):
             other.reset()
-        robot = SerialRobot(RobotSettings(link, urdf, joints))
+        robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), urdf, joints))
         warnings: list[str] = []
         robot.on_warning = warnings.append
         robot.start()

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
 import sys
@@ -26,8 +27,8 @@ from quad_hardware.joints import (
 from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, Model
 
-JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
-ARM_JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite', arm=True)))
+LEGS, ARM = movable_joints(robot_urdf('lite')), movable_joints(robot_urdf('lite', arm=True))
+JOINTS, ARM_JOINTS = (JointMap(map(servo_of, joints)) for joints in (LEGS, ARM))
 HOME = [0.0] * 12
 POSITIONS = st.lists(st.floats(-1e3, 1e3), min_size=12, max_size=12)
 
@@ -49,31 +50,32 @@ def test_no_target_jumps_or_goes_farther_beyond_its_limits(
         targets = list(command.targets)
         steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
         assert max(steps) <= LimiterSettings().max_joint_speed * MAX_PERIOD + 1e-9
-        for servo, before, target in zip(JOINTS.servos, last, targets, strict=True):
-            assert min(servo.lower, before) <= target <= max(servo.upper, before)
+        rows = zip(JOINTS.servos, wanted, last, targets, strict=True)
+        for servo, asked, before, target in rows:
+            low, high = min(servo.lower, before), max(servo.upper, before)
+            assert low <= target <= high
+            assert (servo.joint in command.clamped) is not (low <= asked <= high)
             inside = servo.lower <= target <= servo.upper
             assert inside == (servo.joint not in command.outside)
         last = targets
 
 
-@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_is_refused_by_joint(value: float) -> None:
-    """And the stream goes on with the next command."""
+@pytest.mark.parametrize(
+    ('wrong', 'reason'),
+    [([*HOME[:4], value, *HOME[5:]], 'no finite position for fr_thigh_joint')
+     for value in (math.nan, math.inf, -math.inf)]
+    + [([0.0] * length, f'{length} positions for 12 joints.*fl_hip_joint, fl_t')
+       for length in (0, 1, 11, 13, 16)],
+)  # fmt: skip
+def test_a_wrong_command_is_refused_and_the_stream_goes_on(
+    wrong: list[float], reason: str
+) -> None:
+    """By joint or with all joints in their order."""
     limiter = CommandLimiter(JOINTS)
     limiter.step(HOME, HOME, 0.0)
-    wrong = [*HOME[:4], value, *HOME[5:]]
-    with pytest.raises(CommandError, match='no finite position for fr_thigh_joint'):
+    with pytest.raises(CommandError, match=reason):
         limiter.step(wrong, HOME, 0.02)
     assert limiter.step([0.01] * 12, HOME, 0.04).targets == (0.01,) * 12
-
-
-@pytest.mark.parametrize('length', [0, 1, 11, 13, 16])
-def test_a_wrong_length_is_refused(length: int) -> None:
-    """The message names the joints, in their order."""
-    with pytest.raises(
-        CommandError, match=f'{length} positions for 12 joints.*fl_hip_joint, fl_t'
-    ):
-        CommandLimiter(JOINTS).step([0.0] * length, HOME, 0.0)
 
 
 def test_a_robot_with_arm_takes_legs_or_all() -> None:
@@ -120,14 +122,6 @@ def test_after_a_pause_the_stream_begins_anew() -> None:
     assert limiter.step(HOME, moved, 1.02).targets[1] == pytest.approx(0.3 - 0.04)
 
 
-def test_limits_are_reported() -> None:
-    """Beyond a limit, the target is the limit, and the joint is named."""
-    limiter = CommandLimiter(JOINTS)
-    command = limiter.step([9.0, *HOME[1:]], [0.52, *HOME[1:]], 0.0)
-    assert command.clamped == ('fl_hip_joint',)
-    assert command.targets[0] == JOINTS.servos[0].upper
-
-
 def test_a_leg_that_nobody_has_seen_is_not_moved() -> None:
     """Its target would jump: the command is refused by name, and the next one begins anew."""
     limiter = CommandLimiter(JOINTS)
@@ -152,28 +146,26 @@ def test_an_arm_servo_that_is_not_reported_takes_its_first_target_and_that_is_re
     assert limiter.step([*HOME, 0.0, 0.0, 0.0, 0.0], measured, 5.02).unseen != ()
 
 
-def test_a_servo_found_beyond_its_limits_is_not_moved_by_starting() -> None:
-    """Asked to stay, it stays, for as long as it is asked; and it is reported."""
+def test_from_beyond_its_limits_a_servo_only_comes_back() -> None:
+    """Asked to stay, it stays, for as long as it is asked; and it is reported.
+
+    Farther is refused and reported, nearer is slow, and what was gained is not given away.
+    """
     limiter = CommandLimiter(JOINTS)
     found = [0.9, *HOME[1:]]
     for tick in range(50):
         command = limiter.step(found, found, tick * 0.02)
         assert command.targets == tuple(found)
         assert (command.outside, command.clamped) == (('fl_hip_joint',), ())
-
-
-def test_from_beyond_its_limits_a_servo_only_comes_back() -> None:
-    """Farther is refused and reported, nearer is slow, and what was gained is not given away."""
-    limiter = CommandLimiter(JOINTS)
-    found = [0.9, *HOME[1:]]
-    farther = limiter.step([1.2, *HOME[1:]], found, 0.0)
+    limiter.reset()
+    farther = limiter.step([1.2, *HOME[1:]], found, 1.0)
     assert farther.targets[0] == 0.9
     assert (farther.outside, farther.clamped) == (('fl_hip_joint',), ('fl_hip_joint',))
-    nearer = limiter.step([0.3, *HOME[1:]], found, 0.02)
+    nearer = limiter.step([0.3, *HOME[1:]], found, 1.02)
     assert 0.9 - 0.05 < nearer.targets[0] < 0.9
-    assert limiter.step([1.2, *HOME[1:]], found, 0.04).targets[0] == nearer.targets[0]
+    assert limiter.step([1.2, *HOME[1:]], found, 1.04).targets[0] == nearer.targets[0]
     for tick in range(3, 60):
-        command = limiter.step([0.3, *HOME[1:]], found, tick * 0.02)
+        command = limiter.step([0.3, *HOME[1:]], found, 1.0 + tick * 0.02)
     assert command.targets[0] == 0.3
     assert command.outside == ()
 
@@ -198,78 +190,52 @@ def test_a_lost_robot_may_be_reported_in_the_midst_of_a_command() -> None:
         sys.setswitchinterval(before)
 
 
-ARM = movable_joints(robot_urdf('lite', arm=True))
-LEGS = movable_joints(robot_urdf('lite'))
-
-
-@given(
-    st.sampled_from([1, -1]),
-    st.floats(-3, 3),
-    st.floats(-3, 3),
-)
+@given(st.sampled_from([1, -1]), st.floats(-3, 3), st.floats(-3, 3))
 def test_position_and_angle_are_inverse(sign: int, offset: float, position: float) -> None:
-    """There and back gives the position, whatever sign and offset."""
+    """The offset is where the servo reads zero; the sign turns it round."""
     servo = JointServo('joint', 11, sign, offset)
     assert servo.position(servo.angle(position)) == pytest.approx(position, abs=1e-12)
-
-
-def test_sign_and_offset_mean_what_they_say() -> None:
-    """The offset is where the servo reads zero; the sign turns it round."""
-    servo = JointServo('joint', 11, -1, 0.5)
-    assert servo.position(0.0) == 0.5
-    assert servo.position(90.0) == pytest.approx(0.5 - math.pi / 2)
-    assert servo.velocity(90.0) == pytest.approx(-math.pi / 2)
+    assert servo.position(0.0) == offset
+    assert servo.position(90.0) == pytest.approx(offset + sign * math.pi / 2)
+    assert servo.velocity(90.0) == pytest.approx(sign * math.pi / 2)
 
 
 def test_every_joint_of_the_robot_has_its_motor() -> None:
-    """In the order of the URDF, legs first; zero is zero, but for the gripper."""
-    joints = JointMap(servo_of(joint) for joint in ARM)
-    assert joints.names == tuple(joint.name for joint in ARM)
-    motors = [servo.motor for servo in joints.servos]
+    """In the order of the URDF, legs first; zero is zero, but for the gripper.
+
+    Protocol v1 does not read motor 54: nothing is made up for its joint.
+    """
+    names = tuple(joint.name for joint in ARM)
+    assert ARM_JOINTS.names == names
+    motors = [servo.motor for servo in ARM_JOINTS.servos]
     assert motors == [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31, 54, 53, 52, 51]
-    assert joints.angles([0.0] * 12) == dict.fromkeys(motors[:12], 0.0)
-    gripper = joints.servos[-1]
+    assert ARM_JOINTS.angles([0.0] * 12) == dict.fromkeys(motors[:12], 0.0)
+    gripper = ARM_JOINTS.servos[-1]
     assert [gripper.angle(p) for p in (0.0, 0.02)] == pytest.approx([-65.0, 65.0])
-
-
-def test_servos_that_are_not_reported_are_left_out() -> None:
-    """Protocol v1 does not read motor 54; nothing is made up for its joint."""
-    joints = JointMap(servo_of(joint) for joint in ARM)
     angles = dict.fromkeys(LEG_MOTORS, 90.0)
-    assert joints.positions(angles) == dict.fromkeys(joints.names[:12], pytest.approx(math.pi / 2))
+    assert ARM_JOINTS.positions(angles) == dict.fromkeys(names[:12], pytest.approx(math.pi / 2))
 
 
-def test_a_missing_leg_joint_is_named() -> None:
-    """A URDF without a knee is refused before a port is opened."""
-    servos = [servo_of(joint) for joint in LEGS if joint.name != 'bl_calf_joint']
-    with pytest.raises(
-        CommandError, match=r'no joint for motors 41; .* bl_calf_joint; correct robot_description'
-    ):
-        JointMap(servos)
-
-
-def test_a_joint_without_motor_is_named() -> None:
-    """A renamed joint needs its motor; two joints on one motor are one too many."""
-    renamed = replace(LEGS[2], name='front_left_knee')
-    with pytest.raises(CommandError, match=r'front_left_knee.*joints\.front_left_knee\.motor'):
-        servo_of(renamed)
-    servos = [servo_of(joint) for joint in LEGS]
-    assert servo_of(renamed, 11).lower == LEGS[2].limits.lower
-    with pytest.raises(CommandError, match='motor 11 moves two joints'):
-        JointMap([*servos, servo_of(renamed, 11)])
-
-
-def test_the_legs_come_first() -> None:
-    """Twelve positions are those of the legs: another order is refused, and so are strange ids."""
+def test_joints_that_are_no_quadruped_are_refused_by_name() -> None:
+    """Before a port is opened. The legs come first: twelve positions are theirs."""
     servos = [servo_of(joint) for joint in ARM]
-    with pytest.raises(CommandError, match='has arm_yaw_joint before joints of the legs'):
-        JointMap([servos[12], *servos[:12], *servos[13:]])
-    assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
+    knee = replace(LEGS[2], name='front_left_knee')
     tail = replace(LEGS[2], name='tail_joint')
-    with pytest.raises(
-        CommandError, match=r'tail_joint: unknown motor 61; give joints\.tail_joint\.motor'
-    ):
-        JointMap([*servos, servo_of(tail, 61)])
+    refusals: list[tuple[Callable[[], object], str]] = [
+        (lambda: JointMap(s for s in servos if s.joint != 'bl_calf_joint'),
+         'no joint for motors 41; .* bl_calf_joint; correct robot_description'),
+        (lambda: servo_of(knee), r'front_left_knee.*joints\.front_left_knee\.motor'),
+        (lambda: JointMap([*servos, servo_of(knee, 11)]), 'motor 11 moves two joints'),
+        (lambda: JointMap([servos[12], *servos[:12], *servos[13:]]),
+         'has arm_yaw_joint before joints of the legs'),
+        (lambda: JointMap([*servos, servo_of(tail, 61)]),
+         r'tail_joint: unknown motor 61; give joints\.tail_joint\.motor'),
+    ]  # fmt: skip
+    for refused, reason in refusals:
+        with pytest.raises(CommandError, match=reason):
+            refused()
+    assert servo_of(knee, 11).lower == LEGS[2].limits.lower
+    assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
 
 
 @given(

@@ -21,11 +21,7 @@ from quad_description import (
     raised_feet,
     robot_urdf,
 )
-from quad_hardware.commander import (
-    JointCommander,
-    REPORT_TIMEOUT,
-    SPEED,
-)
+from quad_hardware.commander import JointCommander, REPORT_TIMEOUT, SPEED
 from quad_hardware.joints import JointMap, LimiterSettings, LossReaction, MAX_PERIOD, servo_of
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
@@ -123,15 +119,14 @@ def test_a_stream_that_breaks_off_in_a_trot_brings_the_robot_down(
 
 @pytest.mark.parametrize(('duration', 'lift'), [(2.0, 0.0), (2.0, 0.02), (0.3, 0.3)])
 def test_commands_that_end_on_all_feet_leave_a_posture(duration: float, lift: float) -> None:
-    """Standing, levelling, a person who tries a servo for a moment: nothing moves by itself."""
+    """Standing, levelling, a person who tries a servo for a moment: nothing moves by itself.
+
+    Nor does a robot that walked, and had put down its feet when its commands ended.
+    """
     line = Line()
     assert line.miss(0.0, line.walk(duration, lift) + 1.0) == ''
-
-
-def test_the_posture_at_the_end_counts() -> None:
-    """A robot that walked, and had put down its feet when its commands ended, stands."""
-    line = Line()
-    assert line.miss(0.0, line.walk(0.2, 0.0, start=line.walk(2.0)) + 1.0) == ''
+    walked = line.walk(2.0, start=10.0)
+    assert line.miss(0.0, line.walk(0.2, 0.0, start=walked) + 1.0) == ''
 
 
 def test_a_robot_that_was_just_laid_down_lies() -> None:
@@ -174,30 +169,24 @@ def test_a_body_that_leans_or_sways_stands(roll: float, height: float, pitch: fl
 
 
 @pytest.mark.parametrize(
-    ('place', 'tilt', 'reaction', 'named'),
+    ('place', 'tilt', 'reaction', 'hip', 'named'),
     [
-        ({}, 0.0, LossReaction.LIE, NAMES[0]),
-        (STAND, 1.2, LossReaction.LIE, '69 degrees'),
-        (STAND, 0.0, LossReaction.HOLD, 'command_loss'),
+        ({}, 0.0, LossReaction.LIE, 'fl_hip_joint', NAMES[0]),
+        (STAND, 1.2, LossReaction.LIE, 'fl_hip_joint', '69 degrees'),
+        (STAND, 0.0, LossReaction.HOLD, 'fl_hip_joint', 'command_loss'),
+        (STAND, None, LossReaction.LIE, 'left_front_hip', 'no lying pose is known of left_fr'),
     ],
 )
 def test_it_says_why_it_may_not(
-    place: dict[str, float], tilt: float, reaction: LossReaction, named: str
+    place: dict[str, float], tilt: float | None, reaction: LossReaction, hip: str, named: str
 ) -> None:
-    """Nobody knows where the legs are, the robot lies on its side, or it is not wanted."""
-    line = Line(reaction)
+    """No report has the legs, it lies on its side, it is not wanted, or joints are of others."""
+    first, *rest = JOINTS.servos
+    line = Line(reaction, JointMap([replace(first, joint=hip), *rest]))
+    line.place[hip] = 0.0
     now = line.walk(2.0)
     line.place = place
     assert named in line.miss(tilt, now)
-    assert not line.commander.goes_down
-
-
-def test_a_robot_of_others_holds() -> None:
-    """Where joints have other names, no lying pose is known."""
-    first, *rest = JOINTS.servos
-    line = Line(joints=JointMap([replace(first, joint='left_front_hip'), *rest]))
-    line.place['left_front_hip'] = 0.0
-    assert 'left_front_hip' in line.miss(None, line.walk(2.0))
     assert not line.commander.goes_down
 
 

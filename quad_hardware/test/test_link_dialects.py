@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 import math
@@ -215,10 +215,8 @@ def test_an_arm_joint_is_sent_when_it_changes_and_again_for_a_frame_may_be_lost(
     """Twice a second while commands come, and at once after silence or a change of torque."""
     rig = OldRig()
     sent: list[int] = []  # how often after each command
-    forget = {
-        100: rig.dialect.cancel_pending,
-        101: partial(rig.dialect.torque, on=False),
-    }
+    release = partial(rig.dialect.torque, on=False)
+    forget: dict[int, Callable[[], None]] = {100: rig.dialect.cancel_pending, 101: release}
     for count in range(102):
         forget.get(count, lambda: None)()
         rig.dialect.command({**LEGS, 52: 20.0})

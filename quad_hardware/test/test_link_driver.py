@@ -339,7 +339,7 @@ def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
     The change of the link says so; how much of it has left is not known, so the servos count as
     let go until they are to hold.
     """
-    given: list[bool] = []
+    rig, given = Rig(tmp_path / 'port'), list[bool]()
 
     def order_and_fail(_: Report) -> str:
         if len(rig.states) == 5 and not given:
@@ -347,9 +347,8 @@ def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
             raise ZeroDivisionError
         return ''
 
+    rig.on_state = order_and_fail
     with PtyPeer(tmp_path / 'port') as peer:
-        rig = Rig(peer.link)
-        rig.on_state = order_and_fail
         with rig:
             wait_for(lambda: len(rig.states) > 15, 'reports of the second connection')
         assert given == [True, True]

@@ -7,8 +7,8 @@ Any split, any garbage: no valid frame is lost, and every byte is accounted for.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
-import random
 import struct
 
 from hypothesis import given
@@ -103,16 +103,6 @@ def test_groups_follow_each_other(groups: list[tuple[int, float]]) -> None:
             row.pack(motor=(*motors, 11), angle=(*angles, wrong))
 
 
-@pytest.mark.parametrize('row', ROWS, ids=lambda row: row.name)
-def test_fields_do_not_overlap(row: Function) -> None:
-    """No byte of a payload belongs to two fields, and the table has no hole but at its end."""
-    end = 0
-    for field in row.fields:
-        assert field.offset == end
-        end += field.size
-    assert end <= row.length
-
-
 @given(st.sampled_from(SPANS), st.integers(0, 255))
 def test_every_byte_of_a_range_comes_back(span: Span, byte: int) -> None:
     """Decoding and encoding a byte changes nothing."""
@@ -121,21 +111,14 @@ def test_every_byte_of_a_range_comes_back(span: Span, byte: int) -> None:
 
 @given(st.sampled_from(SPANS), st.floats(allow_nan=False))
 def test_a_byte_is_the_nearest_one(span: Span, value: float) -> None:
-    """What is decoded is half a step off at most, of the value taken into the range."""
+    """What is decoded is half a step off at most, of the value taken into the range.
+
+    0x80 stops, as the vendor's documents say (its library sends 0x7F).
+    """
     inside = min(max(value, span.low), span.high)
     step = (span.high - span.low) / 255
     assert abs(span.decode(span.encode(value)) - inside) <= step / 2 * (1 + 1e-9)
-
-
-def test_zero_of_a_symmetric_range_is_the_neutral_byte() -> None:
-    """0x80 stops, as the vendor's documents say (its library sends 0x7F)."""
     assert V1.functions[Register.VX].spans[Model.LITE].encode(0.0) == 0x80
-
-
-def test_nan_has_no_byte() -> None:
-    """NaN is refused, not turned into an end of the range."""
-    with pytest.raises(CodecError, match='NaN'):
-        Span(-1, 1).encode(math.nan)
 
 
 def test_a_slot_may_hold_anything() -> None:
@@ -146,18 +129,22 @@ def test_a_slot_may_hold_anything() -> None:
     assert (read.position[:15], read.sequence) == (slots[:15], 7)
 
 
-def test_refusals_name_row_field_and_need() -> None:
+def test_what_does_not_fit_is_refused_by_name() -> None:
     """Wrong counts, names, values and lengths say what would have been right."""
     servos = V2.functions[Code.SERVOS]
-    with pytest.raises(CodecError, match='servos: angle missing or unknown'):
-        servos.pack(motor=(11,))
-    with pytest.raises(CodecError, match='not as many'):
-        servos.pack(motor=(11,), angle=(1.0, 2.0))
-    with pytest.raises(CodecError, match=r'servos: .*400.0'):
-        servos.pack(motor=(11,), angle=(400.0,))
-    with pytest.raises(CodecError, match='payload of 4 bytes, not 3'):
-        servos.unpack(bytes(4))
-    assert servos.unpack(servos.pack(motor=(11,), angle=(1.5,)) * 2)['motor'] == (11, 11)
+    refusals: list[tuple[Callable[[], object], str]] = [
+        (lambda: servos.pack(motor=(11,)), 'servos: angle missing or unknown'),
+        (lambda: servos.pack(motor=(11,), angle=(1.0, 2.0)), 'not as many'),
+        (lambda: servos.pack(motor=(11,), angle=(400.0,)), r'servos: .*400.0'),
+        (lambda: servos.unpack(bytes(4)), 'payload of 4 bytes, not 3'),
+        (lambda: Span(-1, 1).encode(math.nan), 'NaN'),
+        (lambda: Frame(Kind.WRITE, 0x50, bytes(248)).encode(V1), 'takes 247'),
+        (lambda: Frame(Kind.PUSH, STATE.address).encode(V1), 'no frame of kind PUSH'),
+        (lambda: Frame(Kind.READ, STATE.address).encode(V1), '0x110 does not fit protocol v1'),
+    ]
+    for refused, reason in refusals:
+        with pytest.raises(CodecError, match=reason):
+            refused()
 
 
 def test_motors_registers_and_slots_agree() -> None:
@@ -179,25 +166,18 @@ def test_a_long_write_runs_through_the_registers() -> None:
     assert list(scatter(0x69, b'rgb')) == [(0x69, b'rgb')]
 
 
-@pytest.mark.parametrize(
-    ('firmware', 'model'),
-    [
-        ('M-4.3.3', Model.MINI),
-        ('L-4.0.1', Model.LITE),
-        ('MW-1.0', Model.WHEELED),
-        ('W-1.0', Model.WHEELED),
-        ('R-3.0', None),
-        ('', None),
-    ],
-)
-def test_a_firmware_names_the_model(firmware: str, model: Model | None) -> None:
+def test_a_firmware_names_the_model() -> None:
     """The first letters decide; a rider is no quadruped."""
-    assert model_of_firmware(firmware) is model
+    names = {
+        'M-4.3.3': Model.MINI, 'L-4.0.1': Model.LITE, 'MW-1.0': Model.WHEELED,
+        'W-1.0': Model.WHEELED, 'R-3.0': None, '': None,
+    }  # fmt: skip
+    assert {name: model_of_firmware(name) for name in names} == names
 
 
 KINDS = HOST_KINDS | ROBOT_KINDS
 
-# printed in the vendor's documents, or recorded from its library
+# of v1: printed in the vendor's documents, or recorded from its library
 GOLDEN = [
     (Frame(Kind.WRITE, Register.VX, b'\xff'), '55 00 09 00 30 FF C7 00 AA'),
     (Frame(Kind.WRITE, Register.VX, b'\x80'), '55 00 09 00 30 80 46 00 AA'),
@@ -220,19 +200,18 @@ GOLDEN = [
         Frame(Kind.WRITE, Register.TORQUE, bytes((Torque.UNLOAD_ALL,))),
         '55 00 09 00 20 01 D5 00 AA',
     ),
-    (
-        Frame(Kind.REPLY, 0x62, struct.pack('<f', 1.5)),
-        '55 00 0C 12 62 00 00 C0 3F 80 00 AA',
-    ),
+    (Frame(Kind.REPLY, 0x62, struct.pack('<f', 1.5)), '55 00 0C 12 62 00 00 C0 3F 80 00 AA'),
+    # the example of the assumed layout of v2: feedback on
+    (Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'), '55 00 0A 00 01 03 01 F0 00 AA'),
 ]
 
 
 @pytest.mark.parametrize(('frame', 'text'), GOLDEN)
-def test_the_vendors_frames_are_made_and_read(frame: Frame, text: str) -> None:
-    """The golden frames of protocol v1, byte for byte, in both directions."""
-    wire = bytes.fromhex(text)
-    assert frame.encode(V1) == wire
-    assert StreamParser(V1, KINDS).feed(wire) == [frame]
+def test_golden_frames_are_made_and_read(frame: Frame, text: str) -> None:
+    """Byte for byte, in both directions."""
+    wire, protocol = bytes.fromhex(text), V2 if frame.address == Code.FEEDBACK else V1
+    assert frame.encode(protocol) == wire
+    assert StreamParser(protocol, KINDS).feed(wire) == [frame]
 
 
 def test_the_state_frame_is_as_stated() -> None:
@@ -242,29 +221,6 @@ def test_the_state_frame_is_as_stated() -> None:
     assert wire[:2] + wire[-2:] == bytes.fromhex('55 00 00 AA')
     assert struct.unpack_from('<3f', wire, 6 + 20) == (1.5, -2.0, 90.0)
     assert V2.wire_time(len(wire)) == pytest.approx(1.27e-3)
-
-
-def test_feedback_on_is_the_documented_frame() -> None:
-    """The example of the assumed layout."""
-    wire = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01').encode(V2)
-    assert wire == bytes.fromhex('55 00 0A 00 01 03 01 F0 00 AA')
-
-
-@given(st.data(), PROTOCOLS)
-def test_every_frame_survives_its_bytes(data: st.DataObject, protocol: Protocol) -> None:
-    """Parsing what was encoded gives the frame back."""
-    frame = data.draw(frames(protocol))
-    assert StreamParser(protocol, KINDS).feed(frame.encode(protocol)) == [frame]
-
-
-def test_what_does_not_fit_is_refused_with_the_reason() -> None:
-    """Too much payload, a kind the protocol lacks, an address that is too large."""
-    with pytest.raises(CodecError, match='takes 247'):
-        Frame(Kind.WRITE, 0x50, bytes(248)).encode(V1)
-    with pytest.raises(CodecError, match='no frame of kind PUSH'):
-        Frame(Kind.PUSH, STATE.address).encode(V1)
-    with pytest.raises(CodecError, match='0x110 does not fit protocol v1'):
-        Frame(Kind.READ, STATE.address).encode(V1)
 
 
 STATE_WIRE = state_frame(sequence=7).encode(V2)
@@ -285,7 +241,7 @@ def test_a_stream_may_be_cut_anywhere(data: st.DataObject, protocol: Protocol) -
 def test_no_valid_frame_behind_garbage_is_lost(data: st.DataObject, protocol: Protocol) -> None:
     """Whatever came before, a frame is found, at the latest when the line goes quiet."""
     garbage = data.draw(
-        st.binary(max_size=40)
+        st.binary(max_size=600)
         | st.sampled_from(
             [b'\x55', b'\x55\x00', b'\x55\x00\xfe', b'\x55\x00\xfe\x12', b'\x55' * 9]
         )
@@ -320,22 +276,6 @@ def test_pieces_make_no_difference(data: bytes, protocol: Protocol) -> None:
     one_by_one = [frame for byte in data for frame in single.feed(bytes((byte,)))]
     assert at_once == one_by_one
     assert whole.counters == single.counters
-
-
-@pytest.mark.parametrize('protocol', [V1, V2], ids=lambda protocol: protocol.name)
-def test_a_megabyte_of_noise_is_survived(protocol: Protocol) -> None:
-    """1 MB of random bytes with frames in between: every frame comes out, memory stays small."""
-    rng = random.Random(1)
-    parser = StreamParser(protocol, ROBOT_KINDS)
-    frame = Frame(Kind.REPLY, 1, b'\x55\x00\xaa')
-    found = []
-    for _ in range(256):
-        found += parser.feed(rng.randbytes(4096))
-        found += parser.feed(frame.encode(protocol))
-        found += parser.expire()
-        assert parser.pending == 0
-    assert found.count(frame) == 256
-    assert parser.counters.skipped == 256 * 4096
 
 
 def test_the_worst_noise_costs_no_memory() -> None:

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 import subprocess
 import sys
-import textwrap
 
 import pytest
 import serial
@@ -111,20 +110,19 @@ def test_what_a_robot_cannot_do_is_said(tmp_path: Path) -> None:
 
 
 def test_a_wrong_motor_or_angle_is_refused(v2_peer: PtyPeer) -> None:
-    """Nothing is sent, not even for the motors that are right."""
+    """Nothing is sent, not even for the motors that are right.
+
+    A second program gets an error, for the port is taken, and steals no bytes.
+    """
     with XgoDog(str(v2_peer.link)) as dog:
         with pytest.raises(ValueError, match='no motor has id 14'):
             dog.write_servo_angles({11: 1.0, 14: 1.0})
         with pytest.raises(ValueError, match='motor 12: nan'):
             dog.write_servo_angles({11: 1.0, 12: float('nan')})
+        with pytest.raises(XgoError, match='another program has it open'):
+            XgoDog(str(v2_peer.link))
         assert dog.read_version()
     assert v2_peer.commands == []
-
-
-def test_a_port_has_one_user(v2_peer: PtyPeer) -> None:
-    """A second program gets an error, for the port is taken, and steals no bytes."""
-    with XgoDog(str(v2_peer.link)), pytest.raises(XgoError, match='another program has it open'):
-        XgoDog(str(v2_peer.link))
 
 
 def test_slots_of_the_feedback() -> None:
@@ -135,40 +133,23 @@ def test_slots_of_the_feedback() -> None:
     assert state.joint_pos_deg[feedback_slot_of(21)] == 3.0
 
 
-def imported_from(path: list[Path]) -> str:
-    """Where a fresh interpreter finds xgo_lib2.client, with folders in its path."""
-    code = 'import sys; sys.path[:0] = sys.argv[1:]; import xgo_lib2.client as c; print(c.WHOSE)'
-    folders = map(str, path)
-    done = subprocess.run(
-        [sys.executable, '-c', code, *folders], capture_output=True, text=True, check=False
+@pytest.mark.parametrize('order', [['ours', 'vendor'], ['vendor', 'ours'], ['ours', 'copy']])
+def test_the_vendors_library_is_used_where_there_is_one(tmp_path: Path, order: list[str]) -> None:
+    """Whatever the order of the path; submodules come from the same place.
+
+    A second copy of ours, as of source tree and installation, is not taken for the vendor's.
+    """
+    vendor, copy = tmp_path / 'vendor' / 'xgo_lib2', tmp_path / 'copy' / 'xgo_lib2'
+    for folder in (vendor, copy.parent):
+        folder.mkdir(parents=True)
+    (vendor / '__init__.py').touch()
+    (vendor / 'client.py').touch()
+    copy.symlink_to(ROOT / 'xgo_lib2')
+    folders = {'ours': ROOT, 'vendor': vendor.parent, 'copy': copy.parent}
+    code = (
+        'import sys; sys.path[:0] = sys.argv[1:]; import xgo_lib2.client as c; print(c.__file__)'
     )
-    return done.stdout.strip() or done.stderr
-
-
-@pytest.mark.parametrize('ours_first', [True, False])
-def test_the_vendors_library_is_used_where_there_is_one(tmp_path: Path, ours_first: bool) -> None:
-    """Whatever the order of the path; submodules come from the same place."""
-    package = tmp_path / 'site' / 'xgo_lib2'
-    package.mkdir(parents=True)
-    (package / '__init__.py').write_text('')
-    (package / 'client.py').write_text("WHOSE = 'vendor'")
-    path = [ROOT, package.parent] if ours_first else [package.parent, ROOT]
-    assert imported_from(path) == 'vendor'
-
-
-def test_a_second_copy_of_ours_is_not_taken_for_the_vendors(tmp_path: Path) -> None:
-    """Source tree and installation may both be in the path."""
-    (tmp_path / 'xgo_lib2').symlink_to(ROOT / 'xgo_lib2')
-    code = textwrap.dedent("""
-        import sys
-        sys.path[:0] = sys.argv[1:]
-        import xgo_lib2.client
-        print(xgo_lib2.__file__)
-    """)
-    done = subprocess.run(
-        [sys.executable, '-c', code, str(ROOT), str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == str(ROOT / 'xgo_lib2' / '__init__.py')
+    command = [sys.executable, '-c', code, *(str(folders[name]) for name in order)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    expected = vendor if 'vendor' in order else ROOT / 'xgo_lib2'
+    assert done.stdout.strip() == str(expected / 'client.py')
