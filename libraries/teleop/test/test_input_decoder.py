@@ -86,65 +86,41 @@ def test_kitty_presses(text: str, name: str) -> None:
     assert decode(text, kitty=True) == [(name, PRESSED)]
 
 
-def test_kitty_press_repeat_release() -> None:
-    """The three events of a key are distinguished, in both forms of the protocol."""
-    text = '\x1b[105;1:1;105u\x1b[105;1:2;105u\x1b[105;1:3u'
-    assert decode(text, kitty=True) == [('i', PRESSED), ('i', REPEATED), ('i', RELEASED)]
-    text = '\x1b[1;1:1A\x1b[1;1:2A\x1b[1;1:3A'
-    assert decode(text, kitty=True) == [('up', PRESSED), ('up', REPEATED), ('up', RELEASED)]
-
-
-def test_release_has_the_name_of_the_press() -> None:
-    """Shift let go of before the letter: the release still belongs to the capital."""
-    text = '\x1b[105:73;2:1;73u' + '\x1b[105;1:3u'
-    assert decode(text, kitty=True) == [('I', PRESSED), ('I', RELEASED)]
-
-
-def test_shift_while_a_key_is_held_changes_the_key() -> None:
-    """A held i becomes I: one is released before the other is pressed."""
-    text = '\x1b[105;1:1;105u' + '\x1b[105:73;2:2;73u' + '\x1b[105:73;2:3u'
-    keys = decode(text, kitty=True)
-    assert keys == [('i', PRESSED), ('i', RELEASED), ('I', PRESSED), ('I', RELEASED)]
-
-
-@pytest.mark.parametrize('code', [57441, 57442, 57447, 57358, 57361])
-def test_modifiers_are_no_keys(code: int) -> None:
-    """Pressing Shift or Caps Lock is not 'any other key'."""
-    assert decode(f'\x1b[{code};2:1u\x1b[{code};1:3u', kitty=True) == []
-
-
 @pytest.mark.parametrize(
-    'text',
+    ('text', 'keys'),
     [
-        '\x1b[9999999u',
-        '\x1b[1114112;2u',
-        '\x1b[1114112;;105u',
-        '\x1b[27;5;9999999~',
-        '\x1b[55296u',
-        '\x1b[57343;2:1u',
+        ('\x1b[105;1:1;105u\x1b[105;1:2;105u\x1b[105;1:3u', '+i =i -i'),
+        ('\x1b[1;1:1A\x1b[1;1:2A\x1b[1;1:3A', '+up =up -up'),
+        # Shift let go of before the letter: the release still belongs to the capital
+        ('\x1b[105:73;2:1;73u\x1b[105;1:3u', '+I -I'),
+        # Shift while i is held: one is released before the other is pressed
+        ('\x1b[105;1:1;105u\x1b[105:73;2:2;73u\x1b[105:73;2:3u', '+i -i +I -I'),
+        # a key that was held before we looked, or was let go of, does not start by its repeat
+        ('\x1b[105;1:2;105u', ''),
+        # a release that happens in another window is never seen, so leaving the window counts
+        ('\x1b[105;1:1;105u\x1b[O\x1b[105;1:2;105u', '+i *'),
+        # Shift, Caps Lock and other modifiers are not "any other key"
+        *((f'\x1b[{code};2:1u\x1b[{code};1:3u', '') for code in (57441, 57447, 57358, 57361)),
     ],
 )
+def test_kitty_presses_repeats_and_releases(text: str, keys: str) -> None:
+    """Each key has its events, in both forms of the protocol."""
+    signs = {PRESSED: '+', REPEATED: '=', RELEASED: '-', KeyAction.ALL_RELEASED: '*'}
+    found = [f'{signs[action]}{key}' for key, action in decode(text, kitty=True)]
+    assert ' '.join(found) == keys
+
+
 @pytest.mark.parametrize('kitty', [False, True])
-def test_a_code_that_is_no_character_is_no_key(text: str, kitty: bool) -> None:
-    """Beyond Unicode, or half of a surrogate pair: passed over, and the next key is read."""
-    assert decode(f'{text}k', kitty=kitty) == [('k', TYPED)]
+def test_a_code_that_is_no_character_is_no_key(kitty: bool) -> None:
+    """Beyond Unicode, or half of a surrogate pair: passed over, and the next key is read.
 
-
-def test_a_character_that_is_none_leaves_the_name_of_the_code() -> None:
-    """As shifted code, as text and as code of the Latin layout."""
+    As shifted code, as text and as code of the Latin layout it leaves the name of the code.
+    """
+    for code in ('9999999', '1114112;2', '1114112;;105', '55296', '57343;2:1'):
+        assert decode(f'\x1b[{code}uk', kitty=kitty) == [('k', TYPED)], code
+    assert decode('\x1b[27;5;9999999~k', kitty=kitty) == [('k', TYPED)]
     text = '\x1b[105:9999999;2u\x1b[106;1;1114112u\x1b[1096::55296;1u'
     assert decode(text, kitty=True) == [('I', PRESSED), ('j', PRESSED), ('ш', PRESSED)]
-
-
-def test_repeat_of_a_key_that_is_not_down_is_no_press() -> None:
-    """A key that was held before we looked, or was let go of, does not start by its repeat."""
-    assert decode('\x1b[105;1:2;105u', kitty=True) == []
-
-
-def test_focus_lost_releases_all() -> None:
-    """A release that happens in another window is never seen, so leaving the window counts."""
-    keys = decode('\x1b[105;1:1;105u\x1b[O\x1b[105;1:2;105u', kitty=True)
-    assert keys == [('i', PRESSED), ('', KeyAction.ALL_RELEASED)]
 
 
 def test_pasted_text_is_not_typed() -> None:
@@ -179,23 +155,9 @@ def test_escape_key_comes_after_a_timeout() -> None:
     assert not decoder.is_pending
 
 
-STREAMS = st.lists(
-    st.sampled_from(
-        [
-            'i',
-            'ш',
-            '\x1b[A',
-            '\x1bOP',
-            '\x1bx',
-            '\x1b[105;1:1;105u',
-            '\x1b[105;1:3u',
-            '\x1b[105:73;2:2;73u',
-            '\x1b[?31u',
-            '\x1b[200~p\x1b[201~',
-        ]
-    ),
-    max_size=20,
-).map(''.join)
+PARTS = ('i', 'ш', '\x1b[A', '\x1bOP', '\x1bx', '\x1b[?31u', '\x1b[200~p\x1b[201~')
+KITTY_PARTS = ('\x1b[105;1:1;105u', '\x1b[105;1:3u', '\x1b[105:73;2:2;73u')
+STREAMS = st.lists(st.sampled_from(PARTS + KITTY_PARTS), max_size=20).map(''.join)
 
 
 @given(STREAMS, st.data())

@@ -19,67 +19,45 @@ def typed(key: str, time: float) -> KeyEvent:
     return KeyEvent(key, KeyAction.TYPED, time)
 
 
-def actions(events: list[KeyEvent]) -> list[tuple[str, KeyAction]]:
-    """Return the actions without their times."""
-    return [(event.key, event.action) for event in events]
+SIGNS = dict(zip(
+    (KeyAction.PRESSED, KeyAction.REPEATED, KeyAction.RELEASED, KeyAction.TYPED), '+=-?',
+    strict=True,
+)) | {KeyAction.ALL_RELEASED: '*'}  # fmt: skip
 
 
-def test_character_gets_the_release_of_its_key() -> None:
-    """Down, character, repeats, up: a press, repeats, and the release at once."""
+@pytest.mark.parametrize(
+    'story',
+    [
+        # down, character, repeats, up: a press, repeats, and the release at once
+        '0.0 down i, 0.01 type i: +i, 0.5 type i: =i, 0.6 up i: -i',
+        # Shift types nothing: down before or after the letter, it is never the key
+        '0.0 down l, 0.01 down shift, 0.02 type l: +l, 0.1 up l: -l, 0.2 up shift',
+        '0.0 down shift, 0.1 down i, 0.1 type I: +I, 0.2 up shift, 0.3 up i: -I',
+        # the press follows when the keyboard's word comes a moment later
+        f'0.0 type i: ?i, {OVERTAKEN / 2} down i: +i',
+        # a slow terminal does not make a tap run on: its end is known
+        '0.0 down i, 0.05 up i, 0.1 type i: +i -i',
+        # over the network, no key of this machine went down: the time-outs apply
+        f'0.0 down i, {WINDOW + 0.01} type i: ?i',
+        # after the focus is lost, the key's release belongs to no key
+        '0.0 down i, 0.0 type i: +i, 0.1 leave all: *, 0.2 up i',
+    ],
+)
+def test_a_character_gets_the_release_of_its_key(story: str) -> None:
+    """What the terminal and the keyboard report, and the keys that both are together."""
     matcher = ReleaseMatcher()
-    assert matcher.key_down(KEY_I, 1.0) == []
-    assert actions(matcher.terminal(typed('i', 1.01))) == [('i', KeyAction.PRESSED)]
-    assert actions(matcher.terminal(typed('i', 1.5))) == [('i', KeyAction.REPEATED)]
-    assert actions(matcher.key_up(KEY_I, 1.6)) == [('i', KeyAction.RELEASED)]
-
-
-def test_shift_is_not_taken_for_the_letter() -> None:
-    """Shift types nothing: down before or after the letter, it is never the key."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_L, 0.5)
-    matcher.key_down(KEY_LEFTSHIFT, 0.51)
-    matcher.terminal(typed('l', 0.52))
-    assert actions(matcher.key_up(KEY_L, 0.6)) == [('l', KeyAction.RELEASED)]
-    matcher.key_up(KEY_LEFTSHIFT, 0.7)
-    matcher.key_down(KEY_LEFTSHIFT, 1.0)
-    matcher.key_down(KEY_I, 1.1)
-    assert actions(matcher.terminal(typed('I', 1.1))) == [('I', KeyAction.PRESSED)]
-    assert matcher.key_up(KEY_LEFTSHIFT, 1.2) == []
-    assert actions(matcher.key_up(KEY_I, 1.3)) == [('I', KeyAction.RELEASED)]
-
-
-def test_keyboard_report_may_come_after_the_character() -> None:
-    """The press follows when the keyboard's word comes a moment later."""
-    matcher = ReleaseMatcher()
-    assert matcher.terminal(typed('i', 1.0)) == [typed('i', 1.0)]
-    late = matcher.key_down(KEY_I, 1.0 + OVERTAKEN / 2)
-    assert actions(late) == [('i', KeyAction.PRESSED)]
-
-
-def test_tap_that_was_over_before_its_character_came() -> None:
-    """A slow terminal does not make a tap run on: its end is known."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_I, 1.0)
-    matcher.key_up(KEY_I, 1.05)
-    events = matcher.terminal(typed('i', 1.1))
-    assert actions(events) == [('i', KeyAction.PRESSED), ('i', KeyAction.RELEASED)]
-
-
-def test_character_without_a_key_stays_typed() -> None:
-    """Over the network, no key of this machine went down: the time-outs apply."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_I, 1.0)
-    late = typed('i', 1.0 + WINDOW + 0.01)
-    assert matcher.terminal(late) == [late]
-
-
-def test_focus_lost_forgets_the_match() -> None:
-    """After the focus is lost, the key's release belongs to no key, and its character is new."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_I, 1.0)
-    matcher.terminal(typed('i', 1.0))
-    matcher.terminal(all_released(1.1))
-    assert matcher.key_up(KEY_I, 1.2) == []
+    codes = {'i': KEY_I, 'l': KEY_L, 'shift': KEY_LEFTSHIFT}
+    for entry in story.split(', '):
+        report, _, keys = entry.partition(':')
+        time, kind, key = report.split()
+        if kind == 'leave':
+            events = matcher.terminal(all_released(float(time)))
+        elif kind == 'type':
+            events = matcher.terminal(typed(key, float(time)))
+        else:
+            change = matcher.key_down if kind == 'down' else matcher.key_up
+            events = change(codes[key], float(time))
+        assert [f'{SIGNS[event.action]}{event.key}' for event in events] == keys.split(), entry
 
 
 RELEASE_STEPS = st.lists(

@@ -39,21 +39,18 @@ def test_what_cannot_be_opened_is_reported(exists: bool, tmp_path: Path) -> None
         InputDevices(str(tmp_path)).open(str(file))
 
 
-def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
-    """event10 comes after event9, and what is no event device is left out."""
-    for name in ('event10', 'event9', 'mouse0', 'by-id'):
-        (tmp_path / name).touch()
-    paths = InputDevices(str(tmp_path)).paths()
-    assert [Path(path).name for path in paths] == ['event9', 'event10']
-
-
-def test_problems_are_reported_with_their_remedy(
+def test_devices_are_found_and_problems_reported_with_their_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No package, no devices, no permission: each has words of its own; else there is none."""
+    """No package, no devices, no permission: each has words of its own; else there is none.
+
+    event10 comes after event9, and what is no event device is left out.
+    """
     devices = InputDevices(str(tmp_path))
     assert 'plug one in, or give the container --device' in devices.problem()
-    (tmp_path / 'event0').touch()
+    for name in ('event10', 'event9', 'mouse0', 'by-id'):
+        (tmp_path / name).touch()
+    assert [Path(path).name for path in devices.paths()] == ['event9', 'event10']
     assert not devices.problem()
     monkeypatch.setattr('os.access', lambda *_: False)
     assert 'usermod -aG input' in devices.problem()

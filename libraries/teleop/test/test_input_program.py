@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import math
 import os
@@ -41,47 +41,27 @@ STEPS = st.lists(st.tuples(COMMANDS, st.sampled_from([0.0, 0.01, 0.03, 0.05, 0.2
 Step = tuple[float | None, float]
 
 
-def silence(stream: CommandStream[float], now: float) -> list[float]:
-    """Want nothing for a long time, and return what is published."""
-    published = (stream.step(None, now + 0.01 * index) for index in range(100))
-    return [velocity for velocity in published if velocity is not None]
-
-
 @given(STEPS)
-def test_only_what_is_wanted_or_zero_is_published(steps: list[Step]) -> None:
-    """No other velocity ever leaves, and a motion only while it is wanted."""
-    stream, now = CommandStream(STREAM_PERIOD, lambda _: 0.0), 0.0
-    for wanted, gap in steps:
-        now += gap
-        published = stream.step(wanted, now)
-        assert published in {wanted, None} if wanted is not None else published in {0.0, None}
+def test_only_what_is_wanted_is_published_at_once_and_its_end(steps: list[Step]) -> None:
+    """No other velocity ever leaves but zero, and a motion only while it is wanted.
 
-
-@given(STEPS)
-def test_every_motion_ends_with_zeros_and_then_silence(steps: list[Step]) -> None:
-    """However it went before: after the end there are some zeros, and nothing more."""
-    stream, now, moving = CommandStream(STREAM_PERIOD, lambda _: 0.0), 0.0, False
-    for wanted, gap in steps:
-        now += gap
-        stream.step(wanted, now)
-        moving = wanted is not None
-    published = silence(stream, now)
-    assert set(published) <= {0.0}
-    assert len(published) == RESTS if moving else len(published) <= RESTS
-    assert stream.is_idle
-    assert stream.due() == math.inf
-
-
-@given(STEPS)
-def test_change_is_published_at_once(steps: list[Step]) -> None:
-    """A new velocity, and the first zero, do not wait for the next period."""
+    A new velocity, and the first zero, do not wait for the next period. However it went before,
+    after the end there are some zeros, and then silence.
+    """
     stream, now, last = CommandStream(STREAM_PERIOD, lambda _: 0.0), 0.0, None
     for wanted, gap in steps:
         now += gap
         published = stream.step(wanted, now)
+        assert published in {wanted or 0.0, None}
         if wanted != last:
             assert published == (wanted or 0.0)
         last = wanted
+    rests = [stream.step(None, now + 0.01 * index) for index in range(100)]
+    zeros = [velocity for velocity in rests if velocity is not None]
+    assert set(zeros) <= {0.0}
+    assert len(zeros) == RESTS if last is not None else len(zeros) <= RESTS
+    assert stream.is_idle
+    assert stream.due() == math.inf
 
 
 def test_steady_velocity_is_repeated_at_the_rate() -> None:
@@ -271,13 +251,10 @@ class Sticks(DeadmanMapping):
         return list(state.pressed_since(self.take(state)))
 
 
-def with_pad(
-    record: Record,
-    stop: threading.Event,
-    *pads: InjectedDevice,
-    deadman: Deadman | None = None,
-) -> Callable[[], None]:
-    """Return what runs a program with the pads that are there."""
+@contextmanager
+def with_pads(*pads: InjectedDevice, deadman: Deadman | None = None) -> Iterator[Record]:
+    """Run a program with the pads that are there; yield the robot's record."""
+    record, stop = Record(), threading.Event()
     gamepad = Gamepad(InjectedDevices(*pads), warn=record.add)
     stream = CommandStream(PERIOD, lambda _: 0.0)
     mapping = Sticks(RecordedRobot(record), deadman or Deadman(), stream, record.add)
@@ -286,7 +263,13 @@ def with_pad(
         with gamepad:
             TeleopProgram(gamepad, mapping, stop).run()
 
-    return run
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield record
+    finally:
+        stop.set()
+        thread.join(TIMEOUT)
 
 
 @pytest.mark.parametrize(
@@ -295,27 +278,19 @@ def with_pad(
 )
 def test_a_gamepad_that_does_not_change_names_the_timeout(position: int, parameter: str) -> None:
     """The motion ends, and the person reads which parameter says after which time."""
-    pad, record, stop = xbox_pad(), Record(), threading.Event()
-    deadman = Deadman(timeout=0.05, full_deflection_timeout=0.05)
-    thread = threading.Thread(target=with_pad(record, stop, pad, deadman=deadman))
-    thread.start()
-    try:
+    pad = xbox_pad()
+    with with_pads(pad, deadman=Deadman(timeout=0.05, full_deflection_timeout=0.05)) as record:
         pad.move(ABS_Y, position)
         pad.press(LEFT_SHOULDER)
         said = f'the gamepad has not changed for 0.05 s ({parameter}), so the motion ended'
         record.wait_for(lambda commands: any(str(one).startswith(said) for one in commands))
-    finally:
-        stop.set()
-        thread.join(TIMEOUT)
 
 
 @pytest.mark.parametrize('unplugged', [False, True])
 def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
     """The stick counts while the deadman is held; then, or without the gamepad, rests follow."""
-    pad, record, stop = xbox_pad(), Record(), threading.Event()
-    thread = threading.Thread(target=with_pad(record, stop, pad))
-    thread.start()
-    try:
+    pad = xbox_pad()
+    with with_pads(pad) as record:
         pad.move(ABS_Y, -32768)
         pad.press(SOUTH)
         record.wait_for(lambda commands: commands == [Button.SOUTH])
@@ -326,20 +301,13 @@ def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
         else:
             pad.release(LEFT_SHOULDER)
         record.wait_for(lambda commands: commands[-RESTS:] == [0.0] * RESTS)
-    finally:
-        stop.set()
-        thread.join(TIMEOUT)
     assert record.commands[-1] == 'flush'
     assert pad.is_closed
 
 
 def test_without_a_gamepad_it_says_so() -> None:
     """A message says what to do; nothing is published, and it ends as usual."""
-    record, stop = Record(), threading.Event()
-    thread = threading.Thread(target=with_pad(record, stop))
-    thread.start()
-    record.wait_for(lambda commands: len(commands) == 1)
-    stop.set()
-    thread.join(TIMEOUT)
+    with with_pads() as record:
+        record.wait_for(lambda commands: len(commands) == 1)
     assert record.commands[0].startswith('no gamepad yet: ')
     assert record.commands[1:] == ['flush']

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import signal
 import subprocess
 import sys
@@ -82,32 +83,26 @@ class Paper(TerminalKeyboard):
         return self.columns
 
 
-def test_same_line_is_written_once() -> None:
-    """An unchanged line costs nothing, which matters over SSH."""
+def test_the_status_line_costs_nothing_when_unchanged_and_stays_below_messages() -> None:
+    """Over SSH that matters; a message erases the line, ends with a new line, and it returns."""
     paper = Paper(40)
     line = StatusLine(paper)
-    line.show('0.15 m/s')
-    written = paper.text
-    line.show('0.15 m/s')
-    assert paper.text == written
-    line.show('0.20 m/s')
-    assert paper.text != written
-
-
-def test_message_stays_above_the_line() -> None:
-    """A message erases the line, ends with a new line, and the line comes again."""
-    paper = Paper(40)
-    line = StatusLine(paper)
-    line.show('status')
+    for text, is_written in (('0.15 m/s', True), ('0.15 m/s', False), ('0.20 m/s', True)):
+        before = paper.text
+        line.show(text)
+        assert (paper.text != before) is is_written
     line.message('message')
-    assert paper.text.endswith('\r\x1b[Kmessage\nstatus')
+    assert paper.text.endswith('\r\x1b[Kmessage\n0.20 m/s')
 
 
-def test_line_never_wraps() -> None:
+def test_line_never_wraps_and_colours_change_no_words() -> None:
     """In a narrow tmux pane the line is cut, colours are switched off again."""
     paper = Paper(8)
     StatusLine(paper).show('\x1b[1mspeed 0.15 m/s\x1b[0m')
     assert paper.text == '\r\x1b[K\x1b[1mspeed 0\x1b[0m'
+    parts = [('idle', Style.DIM), ('0.15 m/s', Style.PLAIN)]
+    assert status_text(parts, colour=False) == 'idle | 0.15 m/s'
+    assert status_text(parts, colour=True) == '\x1b[2midle\x1b[0m | 0.15 m/s'
 
 
 @given(st.text(st.characters(codec='ascii', categories=['L', 'N', 'P', 'Zs'])), st.integers(0, 80))
@@ -116,13 +111,6 @@ def test_cut_text_is_a_beginning(text: str, width: int) -> None:
     assert fitted(text, width) == text[:width]
     assert fitted('狗ab', 3) == '狗a'
     assert fitted('狗狗', 3) == '狗'
-
-
-def test_colours_change_no_words() -> None:
-    """Of the parts of a line."""
-    parts = [('idle', Style.DIM), ('0.15 m/s', Style.PLAIN)]
-    assert status_text(parts, colour=False) == 'idle | 0.15 m/s'
-    assert status_text(parts, colour=True) == '\x1b[2midle\x1b[0m | 0.15 m/s'
 
 
 TIMEOUT = 10.0  # [s] of a test on a busy machine
@@ -196,18 +184,10 @@ def test_old_terminal(answers: bool) -> None:
 
 
 def test_cut_line_releases_the_held_key() -> None:
-    """When the network is cut with a key held, the key does not stay held."""
-    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
-        negotiate(keyboard)
-        terminal.key('i', 1)
-        read_until(keyboard, bool)
-        terminal.stall()
-        events = read_until(keyboard, bool)
-    assert actions(events) == [('', KeyAction.ALL_RELEASED)]
+    """When the network is cut with a key held, the key does not stay held.
 
-
-def test_live_line_keeps_the_held_key() -> None:
-    """A terminal that answers keeps a silent key held well beyond the time-out."""
+    A terminal that answers keeps a silent key held well beyond that time-out.
+    """
     with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
         negotiate(keyboard)
         terminal.key('i', 1)
@@ -215,7 +195,9 @@ def test_live_line_keeps_the_held_key() -> None:
         deadline = time.monotonic() + 1.5
         while time.monotonic() < deadline:
             events += keyboard.read(0.1)
-    assert actions(events) == [('i', KeyAction.PRESSED)]
+        assert actions(events) == [('i', KeyAction.PRESSED)]
+        terminal.stall()
+        assert actions(read_until(keyboard, bool)) == [('', KeyAction.ALL_RELEASED)]
 
 
 def test_pause_gives_the_terminal_back() -> None:
@@ -270,60 +252,53 @@ def test_stuck_terminal_does_not_hold_the_writer_up() -> None:
             signal.alarm(0)
 
 
-def test_keyboard_reports_the_release_that_the_terminal_cannot() -> None:
-    """On an old terminal, the local keyboard's own word ends the hold."""
-    device = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE})
+@contextmanager
+def beside(
+    devices: InjectedDevices, environment: dict[str, str] | None = None
+) -> Iterator[Keyboard]:
+    """Press i on an old terminal, and on the keyboard of this machine."""
     with (
         ScriptedTerminal(kitty=False) as terminal,
-        Keyboard(terminal.path, devices=InjectedDevices(device), environment={}) as keyboard,
+        Keyboard(terminal.path, devices=devices, environment=environment or {}) as keyboard,
     ):
-        device.press(KEY_I)
+        devices.plugged[0].press(KEY_I)
         terminal.send('i')
-        events = read_until(keyboard, bool)
-        assert keyboard.release_source is ReleaseSource.KEYBOARD
-        device.release(KEY_I)
-        events += read_until(keyboard, bool)
-    assert actions(events)[0] in {('i', KeyAction.PRESSED), ('i', KeyAction.TYPED)}
-    assert actions(events)[-1] == ('i', KeyAction.RELEASED)
+        yield keyboard
 
 
-def test_unplugged_keyboard_lets_go() -> None:
-    """A keyboard pulled out with a key down: the key is released, time-outs take over."""
-    device = InjectedDevice('USB keyboard', {KEY_Q, KEY_I, KEY_SPACE})
+@pytest.mark.parametrize('unplugged', [False, True])
+def test_keyboard_reports_the_release_that_the_terminal_cannot(unplugged: bool) -> None:
+    """On an old terminal, the local keyboard's own word ends the hold.
+
+    So does pulling it out with a key down: from then on time-outs take over.
+    """
+    device, held = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE}), HeldKeys()
     devices = InjectedDevices(device)
-    held = HeldKeys()
-    with (
-        ScriptedTerminal(kitty=False) as terminal,
-        Keyboard(terminal.path, devices=devices, environment={}) as keyboard,
-    ):
-        device.press(KEY_I)
-        terminal.send('i')
+    with beside(devices) as keyboard:
         events = read_until(
             keyboard, lambda found: any(e.action is KeyAction.PRESSED for e in found)
         )
-        devices.plugged.clear()
-        device.unplug()
+        sources = [keyboard.release_source]
+        if unplugged:
+            devices.plugged.clear()
+            device.unplug()
+        else:
+            device.release(KEY_I)
         events += read_until(keyboard, bool)
+        assert unplugged or actions(events)[-1] == ('i', KeyAction.RELEASED)
         for event in events:
             held.feed(event)
         assert held.held(time.monotonic()) == ()
-        assert keyboard.release_source is ReleaseSource.TIME_OUT
-    assert device.is_closed
+        sources.append(keyboard.release_source)
+        after = ReleaseSource.TIME_OUT if unplugged else ReleaseSource.KEYBOARD
+        assert sources == [ReleaseSource.KEYBOARD, after]
+        assert device.is_closed is unplugged
 
 
 def test_keyboards_are_not_read_over_ssh() -> None:
     """A person elsewhere is not at this machine's keyboard, which stays unopened."""
-    device = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE})
-    with (
-        ScriptedTerminal(kitty=False) as terminal,
-        Keyboard(
-            terminal.path,
-            devices=InjectedDevices(device),
-            environment={'SSH_CONNECTION': '10.0.0.1 1 10.0.0.2 22'},
-        ) as keyboard,
-    ):
-        device.press(KEY_I)
-        terminal.send('i')
+    devices = InjectedDevices(InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE}))
+    with beside(devices, {'SSH_CONNECTION': '10.0.0.1 1 10.0.0.2 22'}) as keyboard:
         events = read_until(keyboard, bool)
         assert keyboard.release_source is ReleaseSource.TIME_OUT
     assert actions(events) == [('i', KeyAction.TYPED)]
