@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -15,6 +16,10 @@ from quad_msgs.srv import SetMode
 
 STILL = (0.0, 0.0, 0.0)
 TEST_TIMEOUT = 30.0  # [s] of a test on a busy machine
+
+
+def _answer(message: str) -> Callable[[Any, Any], Any]:
+    return lambda _, __: Trigger.Response(success=True, message=message)
 
 
 class Robot:
@@ -36,8 +41,9 @@ class Robot:
         self.poses: list[Pose] = client.listen(Pose, 'body_pose')
         self.modes: list[str] = []
         client.node.create_service(SetMode, 'set_mode', self._set_mode)
-        client.node.create_service(Trigger, 'controller_node/clear_fault', self._clear)
-        client.node.create_service(Trigger, 'stop', self._stop)
+        clear, stop = _answer('all is well'), _answer('nothing walks: relax')
+        client.node.create_service(Trigger, 'controller_node/clear_fault', clear)
+        client.node.create_service(Trigger, 'stop', stop)
         self._diagnostics = client.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     @property
@@ -94,14 +100,6 @@ class Robot:
             values=[KeyValue(key='state', value='fault')],
         )
         self._diagnostics.publish(DiagnosticArray(status=[status]))
-
-    def _stop(self, _request: Any, response: Any) -> Any:
-        response.success, response.message = True, 'nothing walks: relax'
-        return response
-
-    def _clear(self, _request: Any, response: Any) -> Any:
-        response.success, response.message = True, 'all is well'
-        return response
 
     def _set_mode(self, request: Any, response: Any) -> Any:
         self.modes.append(request.mode)

@@ -36,19 +36,10 @@ def pad() -> InjectedDevice:
 
 
 @pytest.fixture
-def context(isolation: Isolation) -> Iterator[None]:
-    """Start ROS in the test's domain."""
-    rclpy.init(domain_id=isolation.domain_id)
-    try:
-        yield
-    finally:
-        rclpy.shutdown()
-
-
-@pytest.fixture
-def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[Robot]:
+def robot(pad: InjectedDevice, isolation: Isolation) -> Iterator[Robot]:
     """Run the node's own loop on the pad, and listen."""
     stop = threading.Event()
+    rclpy.init(domain_id=isolation.domain_id)
     node = TeleopGamepad(InjectedDevices(pad))
     thread = threading.Thread(target=serve_teleop, args=[node, stop])
     thread.start()
@@ -61,12 +52,16 @@ def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[
     finally:
         stop.set()
         thread.join()
+        rclpy.shutdown()
         assert pad.is_closed
 
 
 @pytest.mark.scenario
-def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:
-    """Stick alone: nothing. With the deadman it walks, with turbo faster; let go, it stops."""
+def test_a_gamepad_drives_the_robot(pad: InjectedDevice, robot: Robot) -> None:
+    """Stick alone: nothing. With the deadman it walks, with turbo faster; let go, it stops.
+
+    With the deadman, A asks to stand and the d-pad lifts the body.
+    """
     pad.move(ABS_Y, -32768)
     robot.listen_for(0.3)
     assert robot.twists == []
@@ -74,20 +69,14 @@ def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:
     robot.wait_for(FORWARD)
     pad.press(RIGHT_SHOULDER)
     robot.wait_for((0.3, 0.0, 0.0))
-    pad.release(RIGHT_SHOULDER)
-    pad.release(LEFT_SHOULDER)
-    robot.wait_until_silent()
-
-
-@pytest.mark.scenario
-def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
-    """With the deadman, A asks to stand and the d-pad lifts the body."""
-    pad.press(LEFT_SHOULDER)
     pad.press(SOUTH)
     robot.client.spin_until(lambda: robot.modes == ['stand'], TEST_TIMEOUT, 'set_mode')
     pad.move(ABS_HAT0Y, -1)
     robot.client.spin_until(lambda: bool(robot.poses), TEST_TIMEOUT, 'body pose')
     assert robot.poses[0].position.z == pytest.approx(0.005)
+    pad.release(RIGHT_SHOULDER)
+    pad.release(LEFT_SHOULDER)
+    robot.wait_until_silent()
 
 
 NO_ROBOT: Any = None
@@ -96,14 +85,8 @@ DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
 
 def teleop(deadman: Deadman | None = None) -> GamepadTeleop:
     """Make one: normal speeds 0.15 and 0.6, turbo 0.3 and 1.2."""
-    return GamepadTeleop(
-        NO_ROBOT,
-        deadman or Deadman(),
-        CommandStream(0.05, rest_of),
-        Speeds(0.15, 0.6),
-        Speeds(0.3, 1.2),
-        steps=PoseSteps(),
-    )
+    speeds, stream = (Speeds(0.15, 0.6), Speeds(0.3, 1.2)), CommandStream(0.05, rest_of)
+    return GamepadTeleop(NO_ROBOT, deadman or Deadman(), stream, *speeds, steps=PoseSteps())
 
 
 def state(*buttons: Button, **axes: float) -> GamepadState:
@@ -135,16 +118,14 @@ def test_without_a_deadman_button_rest_is_silence() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('button', 'mode'), MODE_BUTTONS.items())
-def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
-    """A button hit by accident does not make the robot stand up; lying down is always allowed."""
-    assert teleop().feed(state(DEADMAN, button)) == [mode]
-    assert teleop().feed(state(button)) == ([mode] if mode is Mode.LIE else [])
+def test_modes_that_move_need_the_deadman() -> None:
+    """A button hit by accident does not make the robot stand up; lying down is always allowed.
 
-
-@pytest.mark.slow
-def test_a_fault_is_cleared_by_a_button() -> None:
-    """Once for a press, with the deadman or without; nothing moves by it."""
+    So is clearing a fault, once for a press; nothing moves by it.
+    """
+    for button, mode in MODE_BUTTONS.items():
+        assert teleop().feed(state(DEADMAN, button)) == [mode]
+        assert teleop().feed(state(button)) == ([mode] if mode is Mode.LIE else [])
     target = teleop()
     assert target.feed(state(Button.SELECT)) == [RobotRequest.CLEAR_FAULT]
     assert target.feed(state(Button.SELECT, LEFT_Y=0.5)) == []
@@ -217,9 +198,13 @@ STATES = st.builds(
 @pytest.mark.slow
 @given(st.lists(STATES, max_size=30))
 def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) -> None:
-    """Whatever the pad reports: no motion without the button, and none above the speeds."""
+    """Whatever the pad reports: no motion without the button, and none above the speeds.
+
+    At rest, as after it was unplugged, the last word is zero and then there is none.
+    """
     target = teleop()
-    for index, each in enumerate(states):
+    last: object = ZERO
+    for index, each in enumerate([*states, *[AT_REST] * 10]):
         target.feed(each)
         velocity = target.step(0.1 * index)
         if not each.buttons & {DEADMAN, TURBO}:
@@ -228,16 +213,6 @@ def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) 
             limit = 0.3 if TURBO in each.buttons else 0.15
             assert max(abs(velocity.x), abs(velocity.y)) <= limit
             assert abs(velocity.yaw) <= limit * 4
-
-
-@pytest.mark.slow
-@given(st.lists(STATES, max_size=10))
-def test_lost_gamepad_stops(states: list[GamepadState]) -> None:
-    """At rest, as after it was unplugged, the last word is zero and then there is none."""
-    target = teleop()
-    last: object = ZERO
-    for index, each in enumerate([*states, *[AT_REST] * 10]):
-        target.feed(each)
-        last = target.step(0.1 * index) or last
+        last = velocity or last
     assert last == ZERO
     assert target.step(100.0) is None

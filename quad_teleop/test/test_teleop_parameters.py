@@ -35,14 +35,9 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
     shown: list[str] = []
     handled: list[str] = []
 
-    def stop(_: Any, response: Any) -> Any:
-        handled.append('stop')
-        response.success, response.message = True, 'stands'
-        return response
-
-    def set_mode(request: Any, response: Any) -> Any:
-        handled.append(request.mode)
-        response.success, response.message = True, request.mode
+    def serve(request: Any, response: Any) -> Any:
+        handled.append(getattr(request, 'mode', 'stop'))
+        response.success, response.message = True, 'as asked'
         return response
 
     with RosClient(isolation.domain_id) as client:
@@ -55,25 +50,28 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
         def stopped(times: int) -> bool:
             return handled == ['stop'] * times and robot._stops._future is None
 
-        client.node.create_service(Trigger, 'stop', stop)
+        client.node.create_service(Trigger, 'stop', serve)
         wait_for_service('stop')
         robot.handle(Mode.WALK, 0.0)
         robot.handle(RobotRequest.STOP, 0.1)
         client.spin_until(lambda: stopped(1), TEST_TIMEOUT, 'stop')
         robot.handle(RobotRequest.STOP, 0.2)
         client.spin_until(lambda: stopped(2), TEST_TIMEOUT, 'second stop')
-        assert shown == ['stop: stands']
+        assert shown == ['stop: as asked']
         clock.monotonic = lambda: 1.0
         robot.handle(RobotRequest.STOP, 0.3)
         client.spin_until(lambda: stopped(3), TEST_TIMEOUT, 'third stop')
-        assert shown == ['stop: stands'] * 2
+        assert shown == ['stop: as asked'] * 2
 
-        client.node.create_service(SetMode, 'set_mode', set_mode)
+        client.node.create_service(SetMode, 'set_mode', serve)
         wait_for_service('set_mode')
         robot.serve(0.4)
         robot.handle(Mode.STAND, 0.5)
         client.spin_until(lambda: robot.mode is Mode.STAND, TEST_TIMEOUT, 'stand')
         assert handled == ['stop'] * 3 + ['stand']
+
+
+ERRORS = ParameterError, TeleopError, OperatorInputError
 
 
 def gamepad() -> TeleopGamepad:
@@ -112,7 +110,7 @@ def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> se
         (
             gamepad,
             'deadman_full_deflection_timeout:=2.0',
-            'deadman_full_deflection_timeout is 2: it must be at least deadman_timeout, 3',
+            'it must be at least deadman_timeout, 3',
         ),
         (gamepad, 'turbo_spede:=1.0', "did you mean 'turbo_speed'?"),
         (TwistMux, 'use_stampd:=true', "'use_stampd'; did you mean 'use_stamped'?"),
@@ -125,8 +123,7 @@ def test_wrong_parameter_is_refused(
     isolation: Isolation, node: Callable[[], Node], parameter: str, message: str
 ) -> None:
     """A misspelt or senseless parameter is refused, with what it must be or what was meant."""
-    errors = ParameterError, TeleopError, OperatorInputError
-    with pytest.raises(errors, match=re.escape(message)):
+    with pytest.raises(ERRORS, match=re.escape(message)):
         make(isolation, node, parameter)
 
 
@@ -156,7 +153,7 @@ def test_wrong_sources_of_twist_mux_are_refused_by_name(
 ) -> None:
     """A parameter that is misspelt, missing or senseless is named, with what it must be."""
     words = [f'{name}:={value}' for name, value in parameters.items()]
-    with pytest.raises((ParameterError, TeleopError), match=re.escape(message)):
+    with pytest.raises(ERRORS, match=re.escape(message)):
         make(isolation, TwistMux, *words)
 
 
