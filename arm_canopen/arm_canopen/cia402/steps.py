@@ -314,7 +314,8 @@ class AxisSteps:
             raise
         finally:
             axis.view.held_torque = 0
-        if shown is not mode:  # else a move that was halted in it would go on
+        # else a move that was halted in it would go on; a homing begins with its start bit only
+        if shown is not mode or mode.number is OperationMode.HOMING:
             axis.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
