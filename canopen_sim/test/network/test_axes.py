@@ -33,6 +33,8 @@ from arm_canopen import (
 )
 from arm_canopen.config import DriveConfig
 from canopen_core.standard import AXIS_OFFSET, Index
+from canopen_sim import DeviceHost
+from canopen_sim.host import add_devices
 
 JOINT = 'joint1'
 
@@ -287,3 +289,10 @@ def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None
     assert motors(net)[0] == pytest.approx(0.3, abs=2e-3)
     net.do(Y, 'recover')
     assert net.drives[Y].view.state is DriveState.OPERATION_ENABLED
+
+
+def test_each_axis_has_a_position_of_its_own_at_power_on(net: VirtualNetwork) -> None:
+    """By the name of its channel; one that is not given reports 0."""
+    host = DeviceHost(lambda frame: None)
+    add_devices(host, net.network.config, {Y: 0.5})
+    assert [drive.position for drive in host.devices[0].drives] == [0.0, 500.0]

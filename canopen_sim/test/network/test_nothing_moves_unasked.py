@@ -14,15 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-import math
-from pathlib import Path
 import struct
 
 from bus_rig import booted, JOINT, Sent, START, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
-    DRIVE_EDS,
     every_mode,
     MOTION_WRITES,
     pdo,
@@ -35,22 +32,23 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import (
-    BusConfig,
     CanopenError,
     DriveError,
     DriveState,
-    load_bus,
+    NodeConfig,
     OperationMode,
     Severity,
 )
-from arm_canopen.config import PdoConfig
+from arm_canopen.config import PdoConfig, SdoWrite
 from canopen_core.standard import (
     CobId,
     Controlword,
     NmtCommand,
     PdoCodec,
+    POSITION_MODES,
     rpdo_default,
     SYNCHRONOUS_MAX,
+    TORQUE_MODES,
 )
 from canopen_sim import DeviceHost
 from canopen_sim.host import add_devices
@@ -61,7 +59,7 @@ NODE_ID = 2
 STATE_PDO, POSITION_PDO = 0x180 + NODE_ID, 0x280 + NODE_ID
 COMMAND_PDO, TARGET_PDO, STREAM_PDO = 0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID
 SAG_INC = 40
-PLACE = -1.25  # [rad] of a drive at power-on
+PLACE = -1.2503  # [rad] of a drive at power-on
 STREAMED = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
 MODES = [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY, *STREAMED]
 
@@ -276,18 +274,16 @@ TARGETS = {
 }
 OBJECTS = ((CONTROLWORD, 0), (MODE, 0), (POSITION, 0), (VELOCITY, 0), (INTERPOLATION, 1))
 BITS = {CONTROLWORD: 16, MODE: 8, POSITION: 32, VELOCITY: 32, INTERPOLATION: 32}
-STANDS_AFTER = 0.3  # [s] more than a drive takes to begin a move
 UNSHRUNK = (Phase.explicit, Phase.reuse, Phase.generate)
 """Each example takes half a second; a search for the smallest that fails takes minutes."""
 
-Mapping = tuple[tuple[tuple[tuple[int, int], ...], int], ...]
-CIA_402_DEFAULT: Mapping = (
-    (((CONTROLWORD, 0),), 255),
-    (((CONTROLWORD, 0), (MODE, 0)), 255),
-    (((CONTROLWORD, 0), (POSITION, 0)), 255),
-    (((CONTROLWORD, 0), (VELOCITY, 0)), 255),
+CIA_402_DEFAULT = tuple(
+    (((CONTROLWORD, 0), *others), 255)
+    for others in ((), *(((i, 0),) for i in (MODE, POSITION, VELOCITY)))
 )
 """RPDO 1 to 4 as most drives have them (CiA 402-2, 8.1)."""
+
+Mapping = tuple[tuple[tuple[tuple[int, int], ...], int], ...]
 
 
 @st.composite
@@ -307,34 +303,6 @@ def mappings(draw: st.DrawFn) -> Mapping:
 
 def _bits(rpdo: list[tuple[int, int]]) -> int:
     return sum(BITS[index] for index, _ in rpdo)
-
-
-def mapped(mapping: Mapping) -> VirtualNetwork:
-    """Return a network with an enabled drive that has this mapping."""
-    rpdos = tuple(
-        pdo(n, rpdo_default(n, NODE_ID), *objects, transmission=transmission)
-        for n, (objects, transmission) in enumerate(mapping, 1)
-    )
-    net = booted(drive_config(JOINT, NODE_ID, rpdos=rpdos))
-    net.do(JOINT, 'init')
-    return net
-
-
-def go(net: VirtualNetwork, *targets: float) -> list[float]:
-    """Command targets of mode 1, one after another; return where each ended in [rad]."""
-    ends = []
-    for target in targets:
-        net.target(target)
-        rest(net)
-        ends.append(round(net.motor(), 3))
-    return ends
-
-
-def rest(net: VirtualNetwork) -> None:
-    """Run until the drive has stood for a while, wherever it goes."""
-    end, before = net.now + 3.0, math.nan
-    while net.now < end and before != (before := net.motor()):
-        net.run(STANDS_AFTER)
 
 
 @dataclass
@@ -392,46 +360,22 @@ class Reader:
             yield 'end of the halt', target  # cyclic targets go on from where they were
 
 
-def assert_edges_come_after_their_objects(net: VirtualNetwork) -> None:
-    """Read all that the master has sent."""
-    config = net.network.nodes[JOINT].config
-    assert list(Reader(config.rpdos).violations(net.wire.log)) == []
-
-
 @settings(max_examples=25, phases=UNSHRUNK)
-@given(mappings())
-@example(CIA_402_DEFAULT)
-def test_targets_are_executed_in_every_mapping(mapping: Mapping) -> None:
-    """In mode 1, also after a halt, in mode 8 and back, by position of the motor and by frames."""
-    net = mapped(mapping)
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    assert go(net, 0.5, 0.1) == [0.5, 0.1]
-    net.target(1.0)
-    net.run(0.3)
-    net.do(JOINT, 'halt')
-    assert go(net, 0.2) == [0.2]
-    net.select(JOINT, OperationMode.CYCLIC_POSITION)
-    assert go(net, 0.4) == [0.4]
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    assert go(net, 0.3) == [0.3]
-    assert_edges_come_after_their_objects(net)
-
-
-SWITCHES = (
-    OperationMode.PROFILE_POSITION,
-    OperationMode.CYCLIC_POSITION,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.INTERPOLATED_POSITION,
-)
-
-
-@settings(max_examples=25, phases=UNSHRUNK)
-@given(mappings(), st.permutations(SWITCHES), st.booleans())
+@given(mappings(), st.permutations(tuple(TARGETS)), st.booleans())
+@example(CIA_402_DEFAULT, list(TARGETS)[:3], False)
 def test_nothing_jumps_in_any_mapping(
     mapping: Mapping, modes: list[OperationMode], enabled: bool
 ) -> None:
-    """Modes are switched, drives enabled and halts ended with targets that have left before."""
-    net = mapped(mapping)
+    """Each target is executed, and leaves before any edge, as frames and motor show it.
+
+    Modes are switched, drives enabled and halts ended, with targets that have left before.
+    """
+    rpdos = tuple(
+        pdo(n, rpdo_default(n, NODE_ID), *objects, transmission=transmission)
+        for n, (objects, transmission) in enumerate(mapping, 1)
+    )
+    net = booted(drive_config(JOINT, NODE_ID, rpdos=rpdos))
+    net.do(JOINT, 'init')
     for mode in modes:
         if not enabled:
             net.do(JOINT, 'disable')
@@ -444,95 +388,92 @@ def test_nothing_jumps_in_any_mapping(
         net.target(0.3)
         net.run(0.4)
         net.do(JOINT, 'halt')
-        net.target(-0.2)
-        net.run(0.4)
-    assert_edges_come_after_their_objects(net)
-    for before_inc, after_inc in pairwise(positions(net)):
+        for target in (-0.2, 0.1):
+            net.target(target)
+            net.run(1.0)
+            if mode in POSITION_MODES:
+                assert net.motor() == pytest.approx(target, abs=1e-3)
+            else:
+                assert net.speed() == pytest.approx(target, abs=1e-3)
+    assert list(Reader(rpdos).violations(net.wire.log)) == []
+    shown = [struct.unpack_from('<i', data)[0] for data in net.frames(POSITION_PDO)]
+    for before_inc, after_inc in pairwise(shown):
         assert abs(after_inc - before_inc) / SCALE < 0.03  # [rad] in a cycle at 1 rad/s
 
 
-def positions(net: VirtualNetwork) -> list[int]:
-    """Return the positions that the drive reported, one for each SYNC."""
-    return [struct.unpack_from('<i', data)[0] for data in net.frames(0x280 + NODE_ID)]
-
-
-LOAD = 0.2  # share of the rated torque
-CYCLIC = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
-
-
-def kept_alive() -> VirtualNetwork:
+def kept_alive(config: NodeConfig | None = None) -> VirtualNetwork:
     """Return a network whose drive is enabled by a first master, which does not watch it."""
-    net = booted(replace(every_mode(drive_config('a', 2)), reset_communication=False))
-    net.do('a', 'init')
+    config = config or every_mode(drive_config(JOINT, NODE_ID))
+    net = booted(replace(config, reset_communication=False))
+    net.do(JOINT, 'init')
     return net
 
 
-def motor_positions(net: VirtualNetwork, duration: float) -> list[float]:
-    """Return where the motor was in each millisecond of a time in [s]."""
-    seen = []
-    for _ in range(round(duration * 1000)):
-        net.run(0.001)
-        seen.append(float(net.devices['a'].store.find(0x6064).value))
-    return seen
+def take_over(net: VirtualNetwork) -> float:
+    """Let another master find the drive; return when it began in [s]."""
+    net.replace_master()
+    begin = net.now
+    net.start()
+    net.run_until(net.all_ready)
+    return begin
 
 
-@pytest.mark.parametrize('mode', CYCLIC)
+@pytest.mark.parametrize('mode', STREAMED)
 def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     """No state is left, no position changes, and the new master commands it at once."""
     net = kept_alive()
-    net.select('a', mode)
-    net.commands['a'].set_target(0.3)
+    net.select(JOINT, mode)
+    net.target(0.3)
     net.run(3.0)
-    at_rest = motor_positions(net, 0.01)[-1]
-    begin = net.now
-    net.replace_master()
-    net.start()
-    seen = motor_positions(net, 1.0)
-    drive = net.drives['a']
-    assert net.network.nodes['a'].taken_over
+    at_rest = net.motor()
+    begin = take_over(net)
+    net.run(1.0)
+    drive = net.drives[JOINT]
+    assert net.network.nodes[JOINT].taken_over
     assert drive.view.state is DriveState.OPERATION_ENABLED
     assert drive.accepts_targets
-    assert max(abs(position - at_rest) for position in seen) <= 1
-    assert all(word & 0x0F == 0x0F for word in net.controlwords('a', since=begin))
+    shown = [struct.unpack_from('<i', data)[0] for data in net.frames(POSITION_PDO, since=begin)]
+    assert max(abs(position / SCALE - at_rest) for position in shown) <= 1e-4
+    assert all(word & 0x0F == 0x0F for word in net.controlwords(JOINT, since=begin))
     assert any('taken over enabled' in text for text in net.reported())
-    net.commands['a'].set_target(0.5)
+    net.target(0.5)
     net.run(3.0)
     assert drive.view.position == pytest.approx(0.5, abs=1e-3)
+    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+    net.run(0.5)
+    net.network.send_nmt(NmtCommand.START, NODE_ID)
+    net.run(1.0)
+    assert drive.view.state is not DriveState.OPERATION_ENABLED, 'a stop by NMT ends the take-over'
+    assert net.reported(Severity.ERROR) == []
 
 
 @pytest.mark.parametrize(
     ('mode', 'way'),
     [
-        (OperationMode.PROFILE_TORQUE, '0x6077'),
-        (OperationMode.PROFILE_TORQUE, 'no 0x6077'),
+        *((mode, way) for mode in TORQUE_MODES for way in ('0x6077', 'no 0x6077')),
         (OperationMode.PROFILE_TORQUE, 'SDO'),
-        (OperationMode.CYCLIC_TORQUE, '0x6077'),
-        (OperationMode.CYCLIC_TORQUE, 'no 0x6077'),
     ],
 )
 def test_a_torque_that_holds_a_load_is_taken_over_as_it_is(mode: OperationMode, way: str) -> None:
     """Whether a TPDO brings the torque, and an RPDO the target, or not."""
-    config = every_mode(drive_config('a', 2))
+    config = every_mode(drive_config(JOINT, NODE_ID))
     if way != '0x6077':
         config = replace(config, tpdos=config.tpdos[:2])
     if way == 'SDO':
         config = replace(config, rpdos=config.rpdos[:2])
-    net = booted(replace(config, reset_communication=False))
-    net.do('a', 'init')
-    net.select('a', mode)
-    net.simulated('a').set_load(150, net.now)
-    net.commands['a'].set_target(150.0)
+    net = kept_alive(config)
+    net.select(JOINT, mode)
+    net.simulated().set_load(150, net.now)
+    net.target(150.0)
     net.run(1.0)
-    net.do('a', 'halt')
-    net.commands['a'].set_target(150.0)
+    net.do(JOINT, 'halt')
+    net.target(150.0)
     net.run(0.5)
-    begin, speed = net.motor('a'), net.speed('a')
-    assert speed == pytest.approx(0.0, abs=1e-2)
-    net.replace_master()
-    net.start()
-    net.run_until(net.all_ready)
+    begin = net.motor()
+    assert net.speed() == pytest.approx(0.0, abs=1e-2)
+    take_over(net)
     net.run(1.5)
-    assert net.motor('a') == pytest.approx(begin, abs=1e-2)
+    assert net.motor() == pytest.approx(begin, abs=1e-2)
     assert any('it stands' in text for text in net.reported())
 
 
@@ -541,8 +482,7 @@ def test_a_torque_that_holds_a_load_is_taken_over_as_it_is(mode: OperationMode, 
     [
         (OperationMode.PROFILE_POSITION, 6.0),
         (OperationMode.PROFILE_VELOCITY, 1.0),
-        (OperationMode.PROFILE_TORQUE, 100.0),
-        (OperationMode.CYCLIC_TORQUE, 100.0),
+        *((mode, 100.0) for mode in TORQUE_MODES),
     ],
 )
 def test_a_drive_that_moves_is_halted_by_the_new_master(
@@ -550,159 +490,82 @@ def test_a_drive_that_moves_is_halted_by_the_new_master(
 ) -> None:
     """What another master has begun does not go on, and the report says so."""
     net = kept_alive()
-    net.select('a', mode)
-    net.commands['a'].set_target(target)
+    net.select(JOINT, mode)
+    net.target(target)
     net.run(1.0)
-    begin = net.motor('a')
-    net.replace_master()
-    net.start()
-    net.run_until(net.all_ready)
+    begin = net.motor()
+    take_over(net)
     net.run(1.5)
-    assert net.speed('a') == pytest.approx(0.0, abs=1e-2)
-    assert begin < net.motor('a') < 3.0
-    assert net.drives['a'].view.state is DriveState.OPERATION_ENABLED
+    assert net.speed() == pytest.approx(0.0, abs=1e-2)
+    assert begin < net.motor() < 3.0
+    assert net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert not any('it holds' in text for text in net.reported())
-    net.commands['a'].set_target(-target)
+    net.target(-target)
     net.run(0.5)
-    assert net.speed('a') < -0.01
+    assert net.speed() < -0.01
 
 
-def test_a_drive_that_stands_in_a_profile_mode_is_not_halted() -> None:
-    """It is taken over as it is; nothing is warned of."""
+@pytest.mark.parametrize('enabled', [True, False])
+def test_a_drive_that_stands_is_taken_over_as_it_is(*, enabled: bool) -> None:
+    """In a profile mode it is not halted; one that is not enabled is not enabled."""
     net = kept_alive()
-    net.select('a', OperationMode.PROFILE_POSITION)
-    net.replace_master()
-    begin = net.now
-    net.start()
-    net.run_until(net.all_ready)
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    if not enabled:
+        net.do(JOINT, 'disable')
+    begin = take_over(net)
     net.run(1.0)
-    assert not any(word & Controlword.HALT for word in net.controlwords('a', since=begin))
-    assert any('it stands' in text for text in net.reported())
+    assert not any(word & Controlword.HALT for word in net.controlwords(JOINT, since=begin))
+    assert any('it stands' in text for text in net.reported()) is enabled
+    assert (net.simulated().state is DriveState.OPERATION_ENABLED) is enabled
+    assert (net.drives[JOINT].goal is None) is not enabled
 
 
-def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
-    """Taking over requests nothing."""
-    net = kept_alive()
-    net.do('a', 'disable')
-    net.replace_master()
-    net.start()
-    net.run(1.0)
-    assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
-    assert net.drives['a'].goal is None
-
-
-def test_what_was_taken_over_is_led_anew_after_a_stop() -> None:
-    """A stop by NMT ends the take-over: after the next start the drive is not enabled."""
-    net = kept_alive()
-    net.select('a', OperationMode.CYCLIC_POSITION)
-    net.replace_master()
-    net.start()
-    net.run(0.5)
-    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 2)
-    net.run(0.5)
-    net.network.send_nmt(NmtCommand.START, 2)
-    net.run(1.0)
-    assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
-    assert net.reported(Severity.ERROR) == []
-
-
-SCALES = {
-    'default': '',
-    'scale': 'scale_pos_to_dev: 57295.78, scale_pos_from_dev: 1.745329e-5,',
-    'turned': 'scale_pos_to_dev: -2000, scale_pos_from_dev: -0.0005,',
-    'offset': 'offset_pos_to_dev: 300, offset_pos_from_dev: -0.3,',
-    'factor group': 'scale_from_factor_group: true,',
-    'factor group of bus.yml': 'scale_from_factor_group: true, '
-    'sdo: [{index: 0x6092, sub_index: 1, value: 3141592}],',
+SCALES: dict[str, dict[str, float]] = {
+    'scale': {},
+    'turned': {'scale_pos_to_dev': -2000.0, 'scale_pos_from_dev': -0.0005},
+    'offset': {'offset_pos_to_dev': 300.0, 'offset_pos_from_dev': -300.0 / SCALE},
+    'factor group': {'scale_from_factor_group': True},
 }
 
 
-def bus_of(folder: Path, keys: str = '', eds: Path = DRIVE_EDS) -> BusConfig:
-    """Write and read a bus with one drive."""
-    path = folder / 'bus.yml'
-    path.write_text(f"""
-master: {{node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}}
-{JOINT}:
-  {{{keys} node_id: 2, driver: "ros2_canopen::Cia402Driver", dcf: {eds},
-  heartbeat_producer: 100, tpdo: {{
-    1: {{cob_id: auto, transmission: 1, mapping: [{{index: 0x6041}}, {{index: 0x6061}}]}},
-    2: {{cob_id: auto, transmission: 1, mapping: [{{index: 0x6064}}, {{index: 0x606C}}]}}}},
-  rpdo: {{
-    1: {{cob_id: auto, mapping: [{{index: 0x6040}}, {{index: 0x6060}}]}},
-    2: {{cob_id: auto, mapping: [{{index: 0x607A}}, {{index: 0x60FF}}]}},
-    3: {{cob_id: auto, mapping: [{{index: 0x60C1, sub_index: 1}}]}}}}}}
-""")
-    return load_bus(path)
-
-
-def network(bus: BusConfig, positions: dict[str, float]) -> VirtualNetwork:
-    """Return a booted network whose drives stood at positions when they got power."""
-    host = DeviceHost(lambda frame: None)
-    add_devices(host, bus, positions)
+def switched_on_at(position: float, config: NodeConfig) -> VirtualNetwork:
+    """Return a booted network whose drive stood at a position when it got power."""
+    host, bus = DeviceHost(lambda frame: None), bus_config(config)
+    add_devices(host, bus, {JOINT: position})
     net = VirtualNetwork(bus)
-    for node in bus.nodes:
-        places = [drive.position for drive in host.device(node.node_id).drives]
-        for drive, place in zip(net.devices[node.name].drives, places, strict=True):
-            drive.count_from(place)
+    net.simulated().count_from(host.devices[0].drives[0].position)
     net.boot()
     return net
 
 
-@pytest.mark.parametrize('keys', SCALES.values(), ids=SCALES)
-def test_the_master_reads_the_position_in_the_units_of_bus_yml(tmp_path: Path, keys: str) -> None:
+@pytest.mark.parametrize('factor', [[], [sdo_write(0x6092, 1, 3_141_592)]], ids=['', '0x6092'])
+@pytest.mark.parametrize('scales', SCALES.values(), ids=SCALES)
+def test_the_master_reads_the_position_in_the_units_of_bus_yml(
+    scales: dict[str, float], factor: list[SdoWrite]
+) -> None:
     """Whatever scales it; an SDO that changes the factor group counts, too."""
-    bus = bus_of(tmp_path, keys)
-    net = network(bus, {JOINT: PLACE})
+    config = drive_config(JOINT, NODE_ID, scales=scales, sdo_writes=(*MOTION_WRITES, *factor))
+    net = switched_on_at(PLACE, config)
     net.run(0.2)
-    assert net.drives[JOINT].view.position == pytest.approx(PLACE, abs=1e-3)
-    assert net.devices[JOINT].drives[0].position != 0.0
+    assert net.drives[JOINT].view.position == pytest.approx(PLACE, abs=2.6e-4)
+    device, drive = net.devices[JOINT], net.simulated()
+    held = drive.position
+    for kept in (True, False):  # an absolute encoder, or one that counts from 0 at power-on
+        device.switch_off(net.now)
+        device.switch_on(net.now, position_kept=kept)
+        assert drive.position == (held if kept else 0.0)
 
 
 @pytest.mark.parametrize(('method', 'moves'), [(19, True), (35, False)])
-def test_homing_begins_there(tmp_path: Path, method: int, moves: bool) -> None:
+def test_homing_begins_there(method: int, moves: bool) -> None:
     """Home is where the switch is, or where the drive is; it is 0 afterwards, as without."""
-    writes = (
-        f'{{index: 0x6098, sub_index: 0, value: {method}}}, '
-        '{index: 0x6099, sub_index: 1, value: 1000}, {index: 0x6099, sub_index: 2, value: 200}, '
-        '{index: 0x609A, sub_index: 0, value: 20000}'
-    )
-    net = network(bus_of(tmp_path, f'sdo: [{writes}],'), {JOINT: PLACE})
-    drive = net.devices[JOINT].drives[0]
+    net = switched_on_at(PLACE, drive_config(JOINT, NODE_ID))
+    drive = net.simulated()
     start = drive.position - drive.origin
-    net.do(JOINT, 'init')
-    net.do(JOINT, 'home')
+    net.result(net.home(method), 200.0)
     net.run(0.2)
     assert net.drives[JOINT].view.position == pytest.approx(0.0, abs=2e-3)
     assert (abs(drive.position - drive.origin - start) > 100) is moves
-
-
-def test_it_stays_over_a_loss_of_power_with_an_absolute_encoder(tmp_path: Path) -> None:
-    """One that counts begins with 0."""
-    device = network(bus_of(tmp_path), {JOINT: PLACE}).devices[JOINT]
-    for kept, place in ((True, 1000 * PLACE), (False, 0.0)):
-        device.switch_off(30.0)
-        device.switch_on(30.0, position_kept=kept)
-        assert device.drives[0].position == place
-
-
-def test_each_axis_of_a_device_has_its_own(tmp_path: Path) -> None:
-    """By the name of its channel; one that is not given reports 0."""
-    keys = 'num_channels: 2, channel_names: [table_x, table_y],'
-    net = network(
-        bus_of(tmp_path, keys, DRIVE_EDS.with_name('cia402_two_axes.eds')), {'table_y': 0.5}
-    )
-    assert [drive.position for drive in net.devices[JOINT].drives] == [0.0, 500.0]
-
-
-@given(st.floats(-2e6, 2e6))
-def test_any_position_is_met_within_half_an_increment(place: float) -> None:
-    """Up to the range of 0x6064."""
-    host = DeviceHost(lambda frame: None)
-    drive = drive_config(
-        JOINT, NODE_ID, scales={'scale_pos_to_dev': 1e3, 'scale_pos_from_dev': 1e-3}
-    )
-    add_devices(host, bus_config(drive), {JOINT: place})
-    assert host.devices[0].drives[0].position / 1000 == pytest.approx(place, abs=0.5001e-3)
 
 
 @pytest.mark.parametrize(
@@ -710,12 +573,12 @@ def test_any_position_is_met_within_half_an_increment(place: float) -> None:
     [
         ({'joint7': 0.1}, "no drive 'joint7' in .*bus.yml; drives: joint1"),
         ({JOINT: float('nan')}, 'joint1: position nan'),
-        ({JOINT: 3e6}, r'joint1: position 3e\+06 is 3e\+09 increments'),
+        ({JOINT: 3e5}, r'joint1: position 300000 is 3e\+09 increments'),
     ],
 )
-def test_what_no_drive_can_report_is_refused(
-    tmp_path: Path, positions: dict[str, float], words: str
-) -> None:
+def test_what_no_drive_can_report_is_refused(positions: dict[str, float], words: str) -> None:
     """With name and value."""
     with pytest.raises(CanopenError, match=words):
-        add_devices(DeviceHost(lambda frame: None), bus_of(tmp_path), positions)
+        add_devices(
+            DeviceHost(lambda frame: None), bus_config(drive_config(JOINT, NODE_ID)), positions
+        )
