@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from policy_export import export, Layers
@@ -48,16 +49,8 @@ def firm(terrain: Terrain = FLAT) -> Robot:
     return Robot(URDF, Servos.FIRM, terrain)
 
 
-@dataclass(frozen=True)
-class Travel:
-    """How the robot went; means over some time, in its own frame.
-
-    Attributes:
-        x: Forward in [m/s].
-        y: To the left in [m/s].
-        yaw: Turning in [rad/s].
-        tilt: Largest angle between the body's z axis and up in [rad].
-    """
+class Travel(NamedTuple):
+    """How the robot went: mean velocities in its own frame [m/s], [rad/s], largest tilt [rad]."""
 
     x: float
     y: float
@@ -221,26 +214,23 @@ def tilted(angle: float) -> ImuSample:
 class StillPolicy(PolicyRunner):
     """A policy that stands, and answers wrongly on request."""
 
-    def missing(self, inputs: Situation) -> str:
-        """Return what it has to see: what every policy sees."""
-        if inputs.joints is None or inputs.joints.velocities is None:
-            return 'a policy needs the velocities of the joints'
-        return (
-            ''
-            if inputs.imu and inputs.imu.angular_velocity
-            else 'a policy needs what /imu does not have'
-        )
-
-    def inexact(self, joints: JointSample | None, *, stated: bool = False) -> str:
-        """Take all velocities."""
-        return ''
-
     def __init__(self, targets: Targets) -> None:
         """Answer always the same targets."""
         self.name, self.digest = 'still', ''
         self.targets: Targets | None = targets
         self.resets = 0
         self.velocities: list[Velocity] = []
+
+    def missing(self, inputs: Situation) -> str:
+        """Return what it has to see: what every policy sees."""
+        if inputs.joints is None or inputs.joints.velocities is None:
+            return 'a policy needs the velocities of the joints'
+        turning = inputs.imu and inputs.imu.angular_velocity
+        return '' if turning else 'a policy needs what /imu does not have'
+
+    def inexact(self, joints: JointSample | None, *, stated: bool = False) -> str:
+        """Take all velocities."""
+        return ''
 
     def reset(self, others: Targets) -> None:
         """Count."""

@@ -47,28 +47,26 @@ class Tool:
     """A tool: what it writes beside a policy, and how it observes.
 
     Attributes:
+        width: Of the whole observation.
+        observe: Its observation, from this step, the last action and what it keeps in a list.
         files: Names and texts of its files.
         metadata: What it writes into the ONNX file.
         settings: What its files leave open.
-        width: Of the whole observation.
-        observe: Its observation, from this step, the one before (None in the first) and the last
-            action.
         last: What it remembers of an answer.
         target: What it sends for an answer.
         hidden: Width of a recurrent state; 0 for none.
         decimation: Steps of 20 ms for one of the policy.
     """
 
-    files: Mapping[str, str]
-    metadata: Mapping[str, str]
-    settings: Mapping[str, object]
     width: int
     observe: Callable[[Step, Floats, list[Floats]], Floats]
+    files: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, object] = field(default_factory=dict)
     last: Callable[[Floats], Floats] = lambda action: action
     target: Callable[[Floats], Floats] = lambda action: DEFAULTS + np.float32(0.25) * action
     hidden: int = 0
     decimation: int = 1
-    memory: list[Floats] = field(default_factory=list)
 
 
 def mjlab() -> Tool:
@@ -83,7 +81,6 @@ def mjlab() -> Tool:
         return np.concatenate(terms)
 
     return Tool(
-        files={},
         metadata={
             'joint_names': joined([f'robot/{name}' for name in JOINTS]),
             'default_joint_pos': joined(DEFAULTS.tolist()),
@@ -91,15 +88,8 @@ def mjlab() -> Tool:
             'joint_damping': joined([0.25] * 12),
             'action_scale': joined([0.25] * 12),
             'command_names': 'twist',
-            'observation_names': joined(
-                [
-                    'base_ang_vel',
-                    'projected_gravity',
-                    'command',
-                    'joint_pos',
-                    'joint_vel',
-                    'actions',
-                ]
+            'observation_names': (
+                'base_ang_vel,projected_gravity,command,joint_pos,joint_vel,actions'
             ),
             'observation_terms_scale': joined([0.2, 1.0, 1.0, 2.0])
             + f',{";".join(["0.050"] * 12)},1.000',
@@ -158,7 +148,6 @@ def isaac_deploy() -> Tool:
     }  # fmt: skip
     return Tool(
         files={'deploy.yaml': yaml.safe_dump(deploy, sort_keys=False)},
-        metadata={},
         settings={'joints': JOINTS},
         width=5 * 45,
         observe=observe,
@@ -170,17 +159,13 @@ def isaac_env() -> Tool:
     """Isaac Lab's params/env.yaml: patterns of joints, tags of Python, 25 Hz, a height scan."""
 
     def observe(step: Step, last: Floats, _memory: list[Floats]) -> Floats:
-        scan = np.full(6, -0.4, np.float32)
-        return np.concatenate(
-            [step.linear * np.float32(2.0), step.angular, step.gravity, step.command,
-             step.positions - DEFAULTS, step.velocities * np.float32(0.05), last,
-             np.clip(scan, -1.0, 1.0)]
-        )  # fmt: skip
+        terms = [step.linear * np.float32(2.0), step.angular, step.gravity, step.command,
+                 step.positions - DEFAULTS, step.velocities * np.float32(0.05), last,
+                 np.full(6, -0.4, np.float32)]  # fmt: skip
+        return np.concatenate(terms)
 
-    defaults = ''.join(
-        f'        {name}: {value!r}\n'
-        for name, value in zip(JOINTS, DEFAULTS.tolist(), strict=True)
-    )
+    pairs = zip(JOINTS, DEFAULTS.tolist(), strict=True)
+    defaults = ''.join(f'        {name}: {value!r}\n' for name, value in pairs)
     function = 'isaaclab.envs.mdp.observations:'
 
     def term(name: str, kind: str, scale: str = 'null', clip: str = 'null') -> str:
@@ -215,7 +200,6 @@ def isaac_env() -> Tool:
     scale = np.array([0.125 if 'hip' in name else 0.25 for name in JOINTS], np.float32)
     return Tool(
         files={'env.yaml': text},
-        metadata={},
         settings={
             'joints': JOINTS,
             'observation.terms.height_scan.flat': True,
@@ -234,53 +218,30 @@ def rl_sar() -> Tool:
 
     def observe(step: Step, last: Floats, memory: list[Floats]) -> Floats:
         scale = np.array([2.0, 2.0, 0.25], np.float32)
-        frame = np.concatenate(
-            [step.command * scale, step.angular * np.float32(0.25), step.gravity,
-             step.positions - DEFAULTS, step.velocities * np.float32(0.05), last]
-        )  # fmt: skip
-        memory.append(np.clip(frame, -0.8, 0.8))
-        empty = [np.zeros_like(frame)] * 6
-        return np.concatenate([*reversed(memory[-6:]), *empty][:6])
+        terms = [step.command * scale, step.angular * np.float32(0.25), step.gravity,
+                 step.positions - DEFAULTS, step.velocities * np.float32(0.05), last]  # fmt: skip
+        memory.append(np.clip(np.concatenate(terms), -0.8, 0.8))
+        return np.concatenate([*reversed(memory[-6:]), *[np.zeros_like(memory[0])] * 6][:6])
 
     order = [ROBOT.names.index(name) for name in JOINTS]
     config = {
         'xgo/walk': {
-            'model_name': 'policy.onnx',
-            'num_observations': 45,
+            'model_name': 'policy.onnx', 'num_observations': 45,
             'observations': [
-                'commands',
-                'ang_vel',
-                'gravity_vec',
-                'dof_pos',
-                'dof_vel',
-                'actions',
-            ],
-            'observations_history': [0, 1, 2, 3, 4, 5],
-            'observations_history_priority': 'time',
+                'commands', 'ang_vel', 'gravity_vec', 'dof_pos', 'dof_vel', 'actions'],
+            'observations_history': [0, 1, 2, 3, 4, 5], 'observations_history_priority': 'time',
             'clip_obs': 0.8,
-            'clip_actions_lower': low.tolist(),
-            'clip_actions_upper': high.tolist(),
-            'rl_kp': [20.0] * 12,
-            'rl_kd': [0.5] * 12,
-            'action_scale': [0.25] * 12,
-            'lin_vel_scale': 2.0,
-            'ang_vel_scale': 0.25,
-            'dof_pos_scale': 1.0,
-            'dof_vel_scale': 0.05,
-            'commands_scale': [2.0, 2.0, 0.25],
-            'default_dof_pos': DEFAULTS.tolist(),
-            'joint_mapping': order,
+            'clip_actions_lower': low.tolist(), 'clip_actions_upper': high.tolist(),
+            'rl_kp': [20.0] * 12, 'rl_kd': [0.5] * 12, 'action_scale': [0.25] * 12,
+            'lin_vel_scale': 2.0, 'ang_vel_scale': 0.25,
+            'dof_pos_scale': 1.0, 'dof_vel_scale': 0.05, 'commands_scale': [2.0, 2.0, 0.25],
+            'default_dof_pos': DEFAULTS.tolist(), 'joint_mapping': order,
         }
-    }
+    }  # fmt: skip
     base = {'xgo': {'dt': 0.005, 'decimation': 4, 'joint_names': list(ROBOT.names),
                     'joint_mapping': list(range(12))}}  # fmt: skip
     return Tool(
-        files={
-            'config.yaml': yaml.safe_dump(config, sort_keys=False),
-            'base.yaml': yaml.safe_dump(base, sort_keys=False),
-        },
-        metadata={},
-        settings={},
+        files={'config.yaml': yaml.safe_dump(config), 'base.yaml': yaml.safe_dump(base)},
         width=6 * 45,
         observe=observe,
         last=lambda action: np.clip(action, low, high),
@@ -293,17 +254,15 @@ def playground() -> Tool:
 
     def observe(step: Step, last: Floats, _memory: list[Floats]) -> Floats:
         yawed = np.array([-1.0, -1.0, 1.0], np.float32)
-        return np.concatenate(
-            [step.linear * yawed, step.angular * yawed, step.gravity,
-             step.positions - DEFAULTS, step.velocities, last, step.command]
-        )  # fmt: skip
+        terms = [step.linear * yawed, step.angular * yawed, step.gravity,
+                 step.positions - DEFAULTS, step.velocities, last, step.command]  # fmt: skip
+        return np.concatenate(terms)
 
     config = {'ctrl_dt': 0.02, 'sim_dt': 0.004, 'Kp': 10.0, 'Kd': 0.25, 'action_scale': 0.25,
               'history_len': 1, 'command_config': {}, 'pert_config': {},
               'noise_config': {'level': 1.0, 'scales': {'joint_vel': 1.5}}}  # fmt: skip
     return Tool(
         files={'config.json': json.dumps(config)},
-        metadata={},
         settings={
             'joints': JOINTS,
             'default_positions': DEFAULTS.tolist(),
@@ -323,13 +282,8 @@ TOOLS = {make.__name__: make for make in (mjlab, isaac_deploy, isaac_env, rl_sar
 def write_network(tool: Tool, path: Path, *, external: bool = False) -> tuple[Floats, Floats]:
     """Write an ONNX file: ``action = tanh(obs W + h U)``, where h is tanh of itself and obs.
 
-    Args:
-        tool: Whose policy it is.
-        path: Where to.
-        external: Whether its weights lie in a side file.
-
     Returns:
-        Its weights: of the observation, of the recurrent state.
+        W and U; they lie in a side file if the file is external.
     """
     random = np.random.default_rng(7)
     inner = tool.hidden or 1

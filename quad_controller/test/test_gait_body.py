@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from hypothesis import given
@@ -18,7 +19,9 @@ from quad_controller import (
     GaitGenerator,
     GaitParameters,
     ParameterError,
+    PolicyOptions,
     ServoModel,
+    StateParameters,
     Velocity,
 )
 from quad_controller.gait.generator import HeadingHold
@@ -206,15 +209,23 @@ def test_a_wide_stance_has_its_feet_outwards() -> None:
 
 
 @pytest.mark.parametrize(
-    ('values', 'reason'),
+    ('kind', 'values', 'reason'),
     [
-        ({'max_linear_velocity_x': math.nan}, 'max_linear_velocity_x nan'),
-        ({'duty': 0.4}, 'duty 0.4 is below 0.5'),
-        ({'swing_height': -0.01}, 'swing_height -0.01 is not within'),
-        ({'servo': ServoModel(kp=0.0)}, 'kp 0.0 is not a stiffness'),
+        (GaitParameters, {'max_linear_velocity_x': math.nan}, 'max_linear_velocity_x nan'),
+        (GaitParameters, {'duty': 0.4}, 'duty 0.4 is below 0.5'),
+        (GaitParameters, {'swing_height': -0.01}, 'swing_height -0.01 is not within'),
+        (GaitParameters, {'servo': ServoModel(kp=0.0)}, 'kp 0.0 is not a stiffness'),
+        (StateParameters, {'period': 0.0}, 'period'),
+        (StateParameters, {'max_tilt': math.nan}, 'max_tilt'),
+        (StateParameters, {'warn_age': 0.4}, 'warn_age'),
+        (StateParameters, {'hold_age': 0.6}, 'hold_age'),
+        (PolicyOptions, {'phase_period': math.nan}, 'phase_period'),
+        (PolicyOptions, {'soft_limits': 0.0}, 'soft_limits'),
     ],
 )
-def test_odd_parameters_are_refused(values: dict[str, float], reason: str) -> None:
-    """A parameter that makes no sense is named with its range."""
+def test_odd_parameters_are_refused(
+    kind: Callable[..., object], values: dict[str, object], reason: str
+) -> None:
+    """A parameter that makes no sense is named, one of a gait with its range."""
     with pytest.raises(ParameterError, match=reason):
-        GaitParameters(**values)  # type: ignore[arg-type]
+        kind(**values)

@@ -163,16 +163,18 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
 def test_a_policy_may_be_a_link(tmp_path: Path) -> None:
     """Its weights lie beside the link, as in the cache of a download, or beside the file."""
     tool = TOOLS['rl_sar']()
-    write_network(tool, tmp_path / 'policy.onnx', external=True)
+    path = tmp_path / 'policy.onnx'
+    write_network(tool, path, external=True)
     assert run(attached(tool, tmp_path)) == 0
-    digest = load(tmp_path / 'policy.onnx').digest
-    for folder in ('linked', 'snapshot'):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / 'policy.onnx').symlink_to(tmp_path / 'policy.onnx')
-    assert load(tmp_path / 'linked' / 'policy.onnx').digest == digest
+    digest = load(path).digest
+    linked, snapshot = (tmp_path / folder / 'policy.onnx' for folder in ('linked', 'snapshot'))
+    for link in (linked, snapshot):
+        link.parent.mkdir()
+        link.symlink_to(path)
+    assert load(linked).digest == digest
     blob = (tmp_path / 'policy.onnx.data').rename(tmp_path / '4f5e')
-    (tmp_path / 'snapshot' / 'policy.onnx.data').symlink_to(blob)
-    assert load(tmp_path / 'snapshot' / 'policy.onnx').digest == digest
+    snapshot.with_suffix('.onnx.data').symlink_to(blob)
+    assert load(snapshot).digest == digest
 
 
 def test_weights_that_are_overwritten_do_not_count(tmp_path: Path) -> None:
@@ -320,33 +322,48 @@ def test_the_states_of_an_lstm_may_have_any_names(
 
 @pytest.mark.parametrize('order', [1, -1], ids=['base.yaml last', 'base.yaml first'])
 def test_the_mapping_of_a_policy_counts_before_that_of_its_robot(
-    tmp_path: Path, order: int
+    tmp_path: Path, order: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """rl_sar reads base.yaml, then config.yaml over it; left and right would be swapped."""
+    """rl_sar reads base.yaml, then config.yaml over it; left and right would be swapped.
+
+    The table has each value with the file or setting that it is from.
+    """
     tool = TOOLS['rl_sar']()
     write_network(tool, tmp_path / 'policy.onnx')
     model, *files = attached(tool, tmp_path)
-    assert run([model, *files[::order]]) == 0
+    assert run([model, *files[::order], '--set', 'action.scale=0.2']) == 0
     assert list(load(tmp_path / 'policy.onnx').contract.joint_names) == JOINTS
+    lines = capsys.readouterr().out.splitlines()
+    for path, value, origin in (
+        ('action.scale', '0.2', 'set as action.scale'),
+        ('joints', '[fl_hip_joint,', 'base.yaml'),
+        ('observation.terms.ang_vel.scale', '0.25', 'config.yaml'),
+    ):
+        row = next(line.split() for line in lines if line.startswith(f'{path} '))
+        assert row[1] == value
+        assert ' '.join(row).endswith(origin)
 
 
-def test_a_clip_of_scaled_values_is_undone(tmp_path: Path) -> None:
-    """unitree_rl_lab's scale_first; without one scale for a term it is refused."""
-    deploy = {
-        'step_dt': 0.02,
-        'actions': {'JointPositionAction': {'scale': 0.25}},
-        'observations': {
-            'base_ang_vel': {'scale': [0.2] * 3, 'clip': [-1.0, 1.0], 'scale_first': True}
-        },
-    }
+def test_clips_are_read_as_their_tools_mean_them(tmp_path: Path) -> None:
+    """unitree_rl_lab's scale_first is undone by one scale for a term; Isaac's go by patterns."""
+    terms = {'base_ang_vel': {'scale': [0.2] * 3, 'clip': [-1.0, 1.0], 'scale_first': True}}
+    deploy = {'step_dt': 0.02, 'actions': {'JointPositionAction': {'scale': 0.25}}}
     path = tmp_path / 'deploy.yaml'
-    path.write_text(yaml.safe_dump(deploy))
+    path.write_text(yaml.safe_dump({**deploy, 'observations': terms}))
     term = read_contract_file(path).values['observation']['terms']['base_ang_vel']
     assert term['clip'] == pytest.approx([-5.0, 5.0])
-    deploy['observations']['base_ang_vel']['scale'] = [0.2, 0.2, 0.4]  # type: ignore[index]
-    path.write_text(yaml.safe_dump(deploy))
+    terms['base_ang_vel']['scale'] = [0.2, 0.2, 0.4]
+    path.write_text(yaml.safe_dump({**deploy, 'observations': terms}))
     with pytest.raises(PolicyError, match='one scale above 0'):
         read_contract_file(path)
+    text = TOOLS['isaac_env']().files['env.yaml'].replace(
+        'use_default_offset: true\n    clip: null',
+        'use_default_offset: true\n    clip:\n      .*_hip_joint: [-0.1, 0.1]',
+    )  # fmt: skip
+    (tmp_path / 'env.yaml').write_text(text)
+    action = read_contract_file(tmp_path / 'env.yaml', JOINTS).values['action']
+    found = [clip == [-0.1, 0.1] for clip in action['target_clip']]
+    assert found == ['hip' in name for name in JOINTS], 'one that none matches is not clipped'
 
 
 def test_a_history_of_an_older_step_alone_is_refused(tmp_path: Path) -> None:
@@ -354,24 +371,6 @@ def test_a_history_of_an_older_step_alone_is_refused(tmp_path: Path) -> None:
     path = tmp_path / 'config.yaml'
     path.write_text('xgo: {observations: [gravity_vec], observations_history: [1]}')
     assert 'observations_history [1] has gaps' in read_contract_file(path).refusals[0]
-
-
-def test_the_table_has_values_and_origins(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Each value with the file or setting that it is from."""
-    tool = TOOLS['rl_sar']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run([*attached(tool, tmp_path), '--set', 'period=0.04']) == 0
-    lines = capsys.readouterr().out.splitlines()
-    for path, value, origin in (
-        ('period', '0.04', 'set as period'),
-        ('joints', '[fl_hip_joint,', 'base.yaml'),
-        ('observation.terms.ang_vel.scale', '0.25', 'config.yaml'),
-    ):
-        row = next(line.split() for line in lines if line.startswith(f'{path} '))
-        assert row[1] == value
-        assert ' '.join(row).endswith(origin)
 
 
 GOOD = {
@@ -447,6 +446,10 @@ def test_a_contract_of_nothing_asks_for_everything() -> None:
         assert f'{key}: ' in refusal.value.reason
 
 
+BAD_HISTORY = """{sim: {}, decimation: 4,
+observations: {policy: {a: {func: "b:c", history_length: x}}}}"""
+
+
 @pytest.mark.parametrize(
     ('name', 'text', 'words'),
     [
@@ -461,22 +464,14 @@ def test_a_contract_of_nothing_asks_for_everything() -> None:
         ('config.yaml', 'go2: {observations: 5}', 'config.yaml'),
         # Playground's Barkour, Go1 handstand, Spot
         *(
-            (
-                'config.json',
-                f'{{ctrl_dt: 0.02, {more}}}',
-                'than the Go1 joystick',
-            )
+            ('config.json', f'{{ctrl_dt: 0.02, {more}}}', 'than the Go1 joystick')
             for more in (
                 'obs_noise: 0.05',
                 'Kp: 35.0, noise_config: {scales: {linvel: 0.1}}',
                 'history_len: 3, noise_config: {}, pert_config: {}, command_config: {}',
             )
         ),
-        (
-            'env.yaml',
-            'sim: {}\ndecimation: 4\nobservations: {policy: {a: {func: b:c, history_length: x}}}',
-            'env.yaml',
-        ),
+        ('env.yaml', BAD_HISTORY, 'env.yaml'),
     ],
 )
 def test_a_file_of_no_tool_or_form_is_refused(
@@ -505,11 +500,11 @@ def test_commands_stay_within_the_training(tmp_path: Path) -> None:
     """What is faster than the policy was trained for is clamped, as its table says."""
     tool = TOOLS['playground']()
     write_network(tool, tmp_path / 'policy.onnx')
-    ranges = ['--set', 'commands={x: [-0.1, 0.2]}']
-    assert run([*attached(tool, tmp_path), *ranges]) == 0
+    assert run([*attached(tool, tmp_path), '--set', 'commands={x: [-0.1, 0.2]}']) == 0
     loaded = load(tmp_path / 'policy.onnx')
     assert 'clamped to x -0.1 to 0.2' in str(loaded.report)
-    observed = loaded.runner.observe(standing(Velocity(0.5, 0.4, -0.3)))[0]
+    situation, _ = recorded(np.random.default_rng(3))
+    observed = loaded.runner.observe(replace(situation, velocity=Velocity(0.5, 0.4, -0.3)))[0]
     assert observed[-3:] == pytest.approx([0.2, 0.4, -0.3])
 
 
@@ -557,13 +552,11 @@ def test_joint_velocities_are_as_exact_as_in_the_training(
 def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Path) -> None:
     """The order is asked for; the mode is refused while nobody publishes them, or not lately."""
     tool = TOOLS['mjlab']()
-    names, scales, clips, lengths, flat = (
-        'observation_names',
-        *(f'observation_terms_{each}' for each in ('scale', 'clip', 'history_length')),
-        'observation_terms_flatten_history_dim',
-    )
-    more = {names: 'foot_contact', scales: '1.000', clips: '-inf;inf'}
-    more |= {lengths: '0.000', flat: '1.000'}
+    terms = 'observation_terms_'
+    more = {
+        'observation_names': 'foot_contact', f'{terms}scale': '1.000', f'{terms}clip': '-inf;inf',
+        f'{terms}history_length': '0.000', f'{terms}flatten_history_dim': '1.000',
+    }  # fmt: skip
     order = ['fr_foot', 'fl_foot', 'br_foot', 'bl_foot']
     tool = replace(
         tool,
@@ -586,30 +579,22 @@ def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Pa
     assert not controller.set_mode('policy').accepted
 
 
-def standing(velocity: Velocity) -> Situation:
-    """Return what a robot that stands measures."""
-    still = JointSample(STAND, (0.0,) * 12)
-    return Situation(still, UPRIGHT, linear_velocity=(0.0, 0.0, 0.0), velocity=velocity)
-
-
 @pytest.mark.parametrize(
-    ('change', 'words'),
+    ('old', 'new', 'words'),
     [
-        (('JointPositionAction', 'JointVelocityAction'), 'is a JointVelocityAction'),
-        (('JointPositionAction', 'RelativeJointPositionAction'), 'is a RelativeJointPosition'),
-        (('joint_ids: null', 'joint_ids: [1, 0]'), 'an order of joints of its own'),
+        ('JointPositionAction', 'JointVelocityAction', 'is a JointVelocityAction'),
+        ('JointPositionAction', 'RelativeJointPositionAction', 'is a RelativeJointPosition'),
+        ('joint_ids: null', 'joint_ids: [1, 0]', 'an order of joints of its own'),
     ],
 )
 def test_other_actions_than_positions_of_all_joints_are_refused(
-    tmp_path: Path, change: tuple[str, str], words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, old: str, new: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Velocities and differences have the same width; nothing else would show it."""
     tool = TOOLS['isaac_deploy']()
     write_network(tool, tmp_path / 'policy.onnx')
-    arguments = attached(tool, tmp_path)
-    side = tmp_path / 'deploy.yaml'
-    side.write_text(side.read_text().replace(*change))
-    assert run(arguments) == 1
+    changed = {name: text.replace(old, new) for name, text in tool.files.items()}
+    assert run(attached(replace(tool, files=changed), tmp_path)) == 1
     assert words in capsys.readouterr().out
 
 
@@ -646,19 +631,6 @@ def test_a_contract_that_was_written_warns_of_three_decimals(
         assert run([*attached(tool, tmp_path), *last]) == 0
         for text in (capsys.readouterr().out, str(load(tmp_path / 'policy.onnx').report)):
             assert ('0.004, with three decimals' in text) == (not last)
-
-
-def test_clips_of_isaac_lab_are_matched_with_joints(tmp_path: Path) -> None:
-    """By patterns, as scales are; a joint that none matches is not clipped."""
-    tool = TOOLS['isaac_env']()
-    text = tool.files['env.yaml'].replace(
-        'use_default_offset: true\n    clip: null',
-        'use_default_offset: true\n    clip:\n      .*_hip_joint: [-0.1, 0.1]',
-    )
-    (tmp_path / 'env.yaml').write_text(text)
-    document = read_contract_file(tmp_path / 'env.yaml', JOINTS)
-    clips = document.values['action']['target_clip']
-    assert [clip == [-0.1, 0.1] for clip in clips] == ['hip' in name for name in JOINTS]
 
 
 @pytest.mark.parametrize(

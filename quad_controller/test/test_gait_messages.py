@@ -21,7 +21,7 @@ from sensor_msgs.msg import Imu, JointState
 
 from message_templates import FastReader
 from quad_controller import Controller, GaitParameters, Output, StateParameters
-from quad_controller.nodes.control_loop import ControlLoop, loop_figures, Pacer, WINDOW
+from quad_controller.nodes.control_loop import ControlLoop, Pacer, WINDOW
 from quad_controller.nodes.messages import (
     body_pose,
     CommandFilter,
@@ -141,50 +141,36 @@ def test_an_imu_is_read_in_the_frame_that_its_header_names() -> None:
     assert found.acceleration == pytest.approx((0.0, 0.0, 9.8))
 
 
-def with_variance(index: int, variance: float) -> Imu:
-    """Return the message of a level IMU with a variance of roll, pitch or yaw."""
-    message = imu()
-    message.orientation_covariance[index] = variance
-    return message
-
-
 @pytest.mark.parametrize(
     ('index', 'variance', 'uncertain'),
-    [(0, 1.0, True), (4, math.inf, True), (0, 1e-4, False), (8, 1e6, False), (8, math.inf, False)],
-)
+    [(0, 1.0, True), (4, math.inf, True), (0, 1e-4, False), (8, 1e6, False), (8, math.inf, False),
+     (0, math.nan, None), (4, -0.5, None), (8, math.nan, None)],
+)  # fmt: skip
 def test_roll_and_pitch_make_an_attitude_uncertain(
-    index: int, variance: float, uncertain: bool
+    index: int, variance: float, uncertain: bool | None
 ) -> None:
-    """Each alone; an IMU without a compass does not know its heading, and levels."""
-    assert sample(with_variance(index, variance)).is_uncertain is uncertain
-
-
-@pytest.mark.parametrize(('index', 'variance'), [(0, math.nan), (4, -0.5), (8, math.nan)])
-def test_a_variance_that_is_none_is_refused_by_name(index: int, variance: float) -> None:
-    """It is not taken for certain."""
+    """Each alone; a heading need not be known. What is no variance is refused by its name."""
+    message = imu()
+    message.orientation_covariance[index] = variance
+    if uncertain is not None:
+        assert sample(message).is_uncertain is uncertain
+        return
     with pytest.raises(ValueError, match=rf'orientation_covariance\[{index}\] .*{variance}'):
-        sample(with_variance(index, variance))
+        sample(message)
 
 
 @given(angles, angles, angles, st.floats(0.1, 3.0))
 def test_body_pose_is_read_from_a_quaternion(
     roll: float, pitch: float, yaw: float, length: float
 ) -> None:
-    """Roll, pitch and yaw come back, of a quaternion that is not quite one as well."""
+    """Also of one that is not quite a quaternion; one that nobody filled in is upright."""
     message = Pose()
     message.position.z = 0.01
-    rotation = from_rpy(roll, pitch, yaw)
     turn = message.orientation
-    turn.x, turn.y, turn.z, turn.w = (length * part for part in rotation)
-    pose = body_pose(message)
-    assert pose == pytest.approx((0.0, 0.0, 0.01, roll, pitch, yaw), abs=1e-9)
-
-
-def test_a_pose_of_zeros_is_no_rotation() -> None:
-    """A message whose quaternion nobody filled in is upright."""
-    message = Pose()
-    message.orientation.w = 0.0
-    assert body_pose(message) == (0.0,) * 6
+    turn.x, turn.y, turn.z, turn.w = (length * part for part in from_rpy(roll, pitch, yaw))
+    assert body_pose(message) == pytest.approx((0.0, 0.0, 0.01, roll, pitch, yaw), abs=1e-9)
+    turn.x = turn.y = turn.z = turn.w = 0.0
+    assert body_pose(message) == (0.0, 0.0, 0.01, 0.0, 0.0, 0.0)
 
 
 def test_diagnostics_say_what_is_wrong() -> None:
@@ -267,12 +253,6 @@ def simulate(arrivals: list[float], duration: float) -> list[tuple[float, float 
     return steps
 
 
-def test_without_feedback_steps_are_on_schedule() -> None:
-    """The times are multiples of the period, however long a step takes."""
-    times = [time for time, _ in simulate([], 1.0)]
-    assert times == pytest.approx([index * PERIOD for index in range(len(times))])
-
-
 @pytest.mark.slow
 @settings(max_examples=30)
 @given(
@@ -290,7 +270,9 @@ def test_with_feedback_steps_follow_arrivals(offset: float, jitter: list[float])
 
 @given(st.floats(0.005, 0.05))
 def test_the_rate_stays_whatever_the_feedback_does(between: float) -> None:
-    """Feedback at 20 to 200 Hz changes the rate by no more than its pull allows."""
+    """Feedback at 20 to 200 Hz changes the rate by no more than its pull allows; none, not."""
+    plain = [time for time, _ in simulate([], 1.0)]
+    assert plain == pytest.approx([index * PERIOD for index in range(len(plain))])
     arrivals = [index * between for index in range(int(10 / between))]
     steps = simulate(arrivals, 10.0)
     assert len(steps) == pytest.approx(500, rel=0.06)
@@ -306,12 +288,3 @@ def test_a_late_step_is_not_made_up_for() -> None:
     pacer.stepped(0.105, None)
     assert pacer.overruns == 4
     assert 0.105 < pacer.deadline(fresh=False) <= 0.125
-
-
-def test_figures() -> None:
-    """Jitter is the distance of intervals from the period."""
-    steps = [(interval, 0.0002, 0.001) for interval in (0.02, 0.021, 0.018)]
-    figures = loop_figures(steps, PERIOD)
-    assert figures['jitter_max'] == pytest.approx(0.002)
-    assert figures['jitter_p50'] == pytest.approx(0.001)
-    assert figures['rate'] == pytest.approx(3 / 0.059)

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import contextmanager
+from functools import partial
 import math
 from pathlib import Path
 import re
@@ -30,13 +31,14 @@ from quad_controller import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_controller.recording import run as replay_policy
 from quad_description import DescriptionError, quadruped, robot_urdf
-from quad_description.rotations import IDENTITY, Quaternion
 from quad_gait_rig import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
 
 if TYPE_CHECKING:
     from isolation import Isolation
+    from rclpy.publisher import Publisher
+    from rclpy.timer import Timer
 
 pytestmark = pytest.mark.slow
 
@@ -50,15 +52,9 @@ class Robot:
     """Joints that go to their targets, published as a hardware node does.
 
     Attributes:
-        client: A ROS node of the test.
-        process: The controller's.
-        positions: Where the joints are.
-        orientation: Of the body, x, y, z, w.
-        names: Under which they are published.
+        names: Under which the joints are published.
         late: By how much their stamps are in the past [s]; None for none.
         largest_speed: The largest speed of a target so far in [rad/s].
-        commands: All joint commands so far.
-        states: All states that the node published.
     """
 
     def __init__(self, client: RosClient, process: RunningProcess) -> None:
@@ -66,28 +62,29 @@ class Robot:
         self.client, self.process = client, process
         node = client.node
         self.positions = list(FOLDED)
-        self.orientation: Quaternion = IDENTITY
         self.names = list(ROBOT.names)
         self.late: float | None = None
         self.largest_speed, self._stamp = 0.0, 0.0
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
         self._imu = node.create_publisher(Imu, 'imu', 10)
         self.twist = node.create_publisher(Twist, 'cmd_vel', 1)
-        self.stamped = node.create_publisher(TwistStamped, 'cmd_vel_stamped', 1)
         self.commands: list[Any] = []
         node.create_subscription(JointCommand, 'joint_command', self._follow, 1)
         self.states = client.listen(String, 'controller_node/state', LATCHED)
         self.diagnostics = client.listen(DiagnosticArray, '/diagnostics', 50)
 
     def begin(self) -> None:
-        """Publish joints and attitude at 50 Hz from now on."""
+        """Publish joints and attitude at 50 Hz from now on, and wait until the node has all."""
         self.client.node.create_timer(PERIOD, self._publish)
+        self.client.spin_until(
+            lambda: bool(self.commands) and any('ready' in line for line in self.process.lines),
+            20.0,
+            'readiness',
+        )
 
     def _publish(self) -> None:
         imu = Imu()
-        attitude = imu.orientation
-        attitude.x, attitude.y, attitude.z, attitude.w = self.orientation
-        imu.linear_acceleration.z = 9.81
+        imu.orientation.w, imu.linear_acceleration.z = 1.0, 9.81
         if self.late is not None:
             now = self.client.node.get_clock().now()
             imu.header.stamp = (now - Duration(seconds=self.late)).to_msg()
@@ -107,27 +104,22 @@ class Robot:
         self.positions = list(message.position)
         self.commands.append(message)
 
-    def walk(self) -> None:
-        """Request a walk from now on, and wait until it steps."""
-        assert self.mode('walk').success
-        self.until_state('walk')
-        message, before = Twist(), list(self.positions)
-        message.linear.x = 0.2
-        self.client.node.create_timer(0.1, lambda: self.twist.publish(message))
+    def walk(self, stamped: Publisher | None = None) -> Timer:
+        """Stand up and walk from now on; return what sends velocities when it steps."""
+        self.enter('walk')
+        message, before = TwistStamped(), list(self.positions)
+        message.twist.linear.x = 0.2
+        publish = partial(stamped.publish, message) if stamped else partial(
+            self.twist.publish, message.twist
+        )  # fmt: skip
+        timer = self.client.node.create_timer(0.1, publish)
 
         def steps() -> bool:
             pairs = zip(self.positions, before, strict=True)
             return bool(max(abs(a - b) for a, b in pairs) > 0.2)
 
         self.client.spin_until(steps, 20.0, 'steps')
-
-    def until_ready(self) -> None:
-        """Wait until the node has received all that it needs."""
-        self.client.spin_until(
-            lambda: bool(self.commands) and any('ready' in line for line in self.process.lines),
-            20.0,
-            'readiness',
-        )
+        return timer
 
     def mode(self, mode: str) -> Any:
         """Ask for a mode."""
@@ -147,6 +139,11 @@ class Robot:
         service = 'controller_node/set_parameters'
         return self.client.call(SetParameters, service, request).results[0]
 
+    def enter(self, mode: str) -> None:
+        """Ask for a mode, and wait until it is reached."""
+        assert self.mode(mode).success
+        self.until_state(mode)
+
     def until_state(self, state: str) -> None:
         """Wait for a state."""
         self.client.spin_until(
@@ -154,14 +151,23 @@ class Robot:
         )
 
 
+@contextmanager
+def running(isolation: Isolation, *parameters: str) -> Iterator[Robot]:
+    """Start the node with parameters, and a robot for it."""
+    command = [*NODE, *(word for each in parameters for word in ('-p', each))]
+    with (
+        RunningProcess(command, isolation.env) as process,
+        RosClient(isolation.domain_id) as client,
+    ):
+        process.wait_for('waiting for joint_states')
+        yield Robot(client, process)
+
+
 @pytest.fixture
 def robot(isolation: Isolation) -> Iterator[Robot]:
     """Start the node and a robot for it."""
-    with ExitStack() as stack:
-        process = stack.enter_context(RunningProcess(NODE, isolation.env))
-        client = stack.enter_context(RosClient(isolation.domain_id))
-        process.wait_for('waiting for joint_states')
-        yield Robot(client, process)
+    with running(isolation) as robot:
+        yield robot
 
 
 def test_stop_ends_a_walk_while_velocities_come(robot: Robot, isolation: Isolation) -> None:
@@ -171,20 +177,8 @@ def test_stop_ends_a_walk_while_velocities_come(robot: Robot, isolation: Isolati
     publisher of Twist.
     """
     robot.begin()
-    robot.until_ready()
-    assert robot.mode('walk').success
-    robot.until_state('walk')
     with RosClient(isolation.domain_id) as nav2:
-        publisher = nav2.node.create_publisher(TwistStamped, 'cmd_vel', 1)
-        message, before = TwistStamped(), list(robot.commands[-1].position)
-        message.twist.linear.x = 0.2
-
-        def steps() -> bool:
-            pairs = zip(robot.positions, before, strict=True)
-            return bool(max(abs(a - b) for a, b in pairs) > 0.2)
-
-        robot.client.node.create_timer(0.1, lambda: publisher.publish(message))
-        robot.client.spin_until(steps, 20.0, 'steps')
+        robot.walk(nav2.node.create_publisher(TwistStamped, 'cmd_vel', 1))
         answer = robot.client.trigger('stop')
         assert (answer.success, answer.message) == (True, 'stopped: walk; the mode is stand')
         robot.until_state('stand')
@@ -194,7 +188,6 @@ def test_a_bridge_that_is_late_by_its_stamps_stops_the_walk(robot: Robot) -> Non
     """Its messages arrive at their rate, and no target moves on by what they say."""
     robot.late = 0.0
     robot.begin()
-    robot.until_ready()
     robot.walk()
     robot.late = 0.3
     robot.client.spin_until(
@@ -212,7 +205,6 @@ def test_a_bridge_with_another_clock_walks_and_is_reported(robot: Robot, late: f
     """An hour off, either way: ages count from arrival, and the log says so once for a topic."""
     robot.late = late
     robot.begin()
-    robot.until_ready()
     robot.walk()
     for topic in ('/joint_states', '/imu'):
         text = f'the clocks of {topic} and of this computer differ by '
@@ -228,34 +220,21 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     assert not answer.success
     assert '/joint_states' in answer.message
     robot.begin()
-    robot.until_ready()
     assert list(robot.commands[0].position) == pytest.approx(FOLDED, abs=1e-6)
     assert 'gait:crawl' in robot.mode('dance').message
     assert not robot.tune(nominal_height=0.9).successful
     assert 'do not reach' in robot.tune(nominal_height=0.2).reason
     assert robot.tune(swing_height=0.025).successful
-    assert robot.mode('stand').success
-    robot.until_state('stand')
-    assert robot.mode('walk').success
-    robot.until_state('walk')
-    assert 'not in walk' in robot.tune(swing_height=0.02).reason
+    robot.enter('stand')
     node = robot.client.node
-    message = TwistStamped()
-    message.twist.linear.x = 0.2
-    timer = node.create_timer(0.1, lambda: robot.stamped.publish(message))
-    before = list(robot.commands[-1].position)
-    robot.client.spin_until(
-        lambda: max(abs(a - b) for a, b in zip(robot.positions, before, strict=True)) > 0.2,
-        20.0,
-        'steps',
-    )
+    timer = robot.walk(node.create_publisher(TwistStamped, 'cmd_vel_stamped', 1))
+    assert 'not in walk' in robot.tune(swing_height=0.02).reason
     node.destroy_timer(timer)
     bad = Twist()
     bad.linear.x = math.nan
     robot.twist.publish(bad)
     robot.process.wait_for('it is not finite')
-    assert robot.mode('lie').success
-    robot.until_state('lie')
+    robot.enter('lie')
     # the speed limit of the joints is 10 rad/s, and the time between two steps is not exact
     assert robot.largest_speed < 20.0
     figures = {
@@ -274,20 +253,15 @@ def test_a_shipped_policy_is_found_checked_watched_and_recorded(
 
     The recording has them, and replay_policy finds the same ones.
     """
-    with ExitStack() as stack:
-        words = ['-p', 'policy:=trot_ppo', '-p', 'policy_dry_run:=true']
-        words += ['-p', f'record:={tmp_path}']
-        process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
-        client = stack.enter_context(RosClient(isolation.domain_id))
-        process.wait_for('waiting for joint_states')
-        robot = Robot(client, process)
-        reports = client.listen(String, 'controller_node/policy', LATCHED)
-        shadows = client.listen(JointCommand, 'joint_command_shadow', 1)
+    words = 'policy:=trot_ppo', 'policy_dry_run:=true', f'record:={tmp_path}'
+    with running(isolation, *words) as robot:
+        reports = robot.client.listen(String, 'controller_node/policy', LATCHED)
+        shadows = robot.client.listen(JointCommand, 'joint_command_shadow', 1)
         robot.begin()
-        client.spin_until(lambda: bool(shadows and reports), 20.0, 'shadow commands')
+        robot.client.spin_until(lambda: bool(shadows and reports), 20.0, 'shadow commands')
         assert 'sha256' in reports[0].data
         assert 'dry run' in robot.mode('policy').message
-        process.stop()
+        robot.process.stop()
     (recording,) = tmp_path.iterdir()
     assert replay_policy([str(recording)]) == 0
 
@@ -296,17 +270,11 @@ def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_pa
     """A renamed joint is named in the table and in the answer; the robot still walks."""
     names = joined(['fl_hip', *ROBOT.names[1:]])
     path = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
-    with ExitStack() as stack:
-        words = ['-p', f'policy:={path}']
-        process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
-        client = stack.enter_context(RosClient(isolation.domain_id))
-        process.wait_for('not in the robot: fl_hip')
-        robot = Robot(client, process)
+    with running(isolation, f'policy:={path}') as robot:
+        robot.process.wait_for('not in the robot: fl_hip')
         robot.begin()
-        robot.until_ready()
         assert 'not in the robot: fl_hip' in robot.mode('policy').message
-        assert robot.mode('stand').success
-        robot.until_state('stand')
+        robot.enter('stand')
 
 
 def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -> None:
@@ -319,9 +287,7 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     inexact = robot.client.node.create_publisher(Float64, 'joint_velocity_error', LATCHED)
     inexact.publish(Float64(data=0.5))
     robot.begin()
-    robot.until_ready()
-    assert robot.mode('walk').success
-    robot.until_state('walk')
+    robot.enter('walk')
     assert 'neither a file nor shipped' in robot.load('no_such').message
     assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
     answer = robot.load(str(still))
@@ -340,9 +306,7 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
 def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None:
     """A robot whose reports lack a joint is held, and the joint named; then it can be cleared."""
     robot.begin()
-    robot.until_ready()
-    assert robot.mode('stand').success
-    robot.until_state('stand')
+    robot.enter('stand')
     robot.names[0] = 'somebody_else'
     robot.until_state('fault')
     robot.process.wait_for('holding the last targets')

@@ -49,36 +49,41 @@ pytestmark = pytest.mark.slow
 LEVEL = math.radians(5.0)
 
 
+def goes(
+    rig: PhysicsRig, velocity: Velocity, within: Velocity, mode: str = 'walk', tilt: float = LEVEL
+) -> None:
+    """Walk for eight seconds: at true speed to within that of another velocity, and upright."""
+    rig.mode(mode)
+    rig.run(2.0, velocity)
+    travel = rig.travel(8.0, velocity)
+    assert not rig.faulted
+    for axis in ('x', 'y', 'yaw'):
+        went, commanded, most = (getattr(each, axis) for each in (travel, velocity, within))
+        assert went == pytest.approx(commanded, abs=most), axis
+    assert travel.tilt < tilt
+
+
 @pytest.mark.parametrize(
     'velocity',
     [Velocity(0.2), Velocity(0.0, -0.1), Velocity(0.0, 0.0, 1.0), Velocity(0.15, 0.0, -0.6)],
 )
 def test_trot_goes_as_commanded(velocity: Velocity) -> None:
-    """Ten seconds of trot, 35 periods, keep speed and direction, and the body upright.
+    """35 periods of trot keep speed and direction, and the body upright.
 
     The test of servos of any stiffness has other velocities.
     """
-    rig = PhysicsRig()
-    rig.mode('walk')
-    rig.run(1.0, velocity)
-    travel = rig.travel(9.0, velocity)
-    assert not rig.faulted
-    assert travel.x == pytest.approx(velocity.x, abs=0.03)
-    assert travel.y == pytest.approx(velocity.y, abs=0.02)
-    assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.02 * abs(velocity.yaw), 0.01))
-    assert travel.tilt < LEVEL
+    goes(PhysicsRig(), velocity, Velocity(0.03, 0.02, max(0.02 * abs(velocity.yaw), 0.01)))
 
 
-def test_the_slowest_loop_that_is_allowed_walks_at_true_speed() -> None:
+@pytest.mark.parametrize(
+    'velocity', [Velocity(0.1), Velocity(0.3), Velocity(-0.2), Velocity(0.0, 0.15)]
+)
+def test_the_slowest_loop_that_is_allowed_walks_at_true_speed(velocity: Velocity) -> None:
     """A loop with fewer set-points in a period of the gait is refused."""
     slowest = next(span for name, _, span, _ in settings_of(StateParameters) if name == 'period')
     assert slowest is not None
-    for velocity in (Velocity(0.1), Velocity(0.3), Velocity(-0.2), Velocity(0.0, 0.15)):
-        rig = PhysicsRig(states=StateParameters(period=slowest[1]))
-        rig.mode('walk')
-        rig.run(2.0, velocity)
-        travel = rig.travel(3.0, velocity)
-        assert math.hypot(travel.x - velocity.x, travel.y - velocity.y) < 0.03, velocity
+    rig = PhysicsRig(states=StateParameters(period=slowest[1]))
+    goes(rig, velocity, Velocity(0.025, 0.025, 0.1), tilt=2.0 * LEVEL)
 
 
 def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> None:
@@ -106,14 +111,7 @@ def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> 
 @pytest.mark.parametrize(('preset', 'arm'), [('mini', False), ('lite', True)])
 def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
     """What differs is read from the URDF: limits, and an arm's weight, which stays in place."""
-    urdf = robot_urdf(preset, arm)
-    rig = PhysicsRig(urdf=urdf)
-    rig.mode('walk')
-    rig.run(1.0, Velocity(0.2))
-    travel = rig.travel(8.0, Velocity(0.2))
-    assert not rig.faulted
-    assert travel.x == pytest.approx(0.2, abs=0.03)
-    assert travel.tilt < LEVEL
+    goes(PhysicsRig(urdf=robot_urdf(preset, arm)), Velocity(0.2), Velocity(0.03, 0.03, 0.1))
 
 
 @pytest.mark.parametrize(
@@ -132,17 +130,9 @@ def test_a_robot_of_another_size_trots_by_its_own_urdf(velocity: Velocity) -> No
         max_linear_velocity_y=0.4,
         servo=ServoModel(kp=60.0, damping=5.1),
     )
-    rig = PhysicsRig(
-        Robot(urdf, servo, pose=start), gait, urdf=urdf, states=StateParameters(lie_height=0.12)
-    )
-    rig.mode('walk')
-    rig.run(2.0, velocity)
-    travel = rig.travel(8.0, velocity)
-    assert not rig.faulted
-    assert travel.x == pytest.approx(velocity.x, abs=0.1)
-    assert travel.y == pytest.approx(velocity.y, abs=0.1)
-    assert travel.yaw == pytest.approx(velocity.yaw, abs=0.1)
-    assert travel.tilt < math.radians(12.0)
+    states = StateParameters(lie_height=0.12)
+    rig = PhysicsRig(Robot(urdf, servo, pose=start), gait, urdf=urdf, states=states)
+    goes(rig, velocity, Velocity(0.1, 0.1, 0.1), tilt=math.radians(12.0))
 
 
 def test_servos_that_cannot_carry_another_robot_are_refused() -> None:
@@ -159,14 +149,7 @@ def test_servos_that_cannot_carry_another_robot_are_refused() -> None:
 def test_other_gaits_go_as_commanded(gait: str, velocity: Velocity) -> None:
     """Crawl and pace keep a fifth of the speed, at least, and do not fall."""
     rig = PhysicsRig(firm(), FIRM)
-    rig.mode(f'gait:{gait}')
-    rig.run(2.0, velocity)
-    travel = rig.travel(8.0, velocity)
-    assert not rig.faulted
-    assert travel.x == pytest.approx(velocity.x, abs=0.015)
-    assert travel.y == pytest.approx(velocity.y, abs=0.015)
-    assert travel.yaw == pytest.approx(velocity.yaw, abs=0.08)
-    assert travel.tilt < LEVEL
+    goes(rig, velocity, Velocity(0.015, 0.015, 0.08), mode=f'gait:{gait}')
 
 
 @pytest.mark.parametrize('kick', [(0.0, 0.5, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0)])
@@ -268,14 +251,6 @@ def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:
     assert tilts[1] < 0.75 * tilts[0]
 
 
-def test_without_compensation_the_nominal_servos_lose_a_third_of_the_speed() -> None:
-    """What the default is for."""
-    rig = PhysicsRig(gait=GaitParameters(servo=None))
-    rig.mode('walk')
-    rig.run(1.0, Velocity(0.2))
-    assert rig.travel(5.0, Velocity(0.2)).x < 0.15
-
-
 @pytest.mark.parametrize(
     ('stiffness', 'delay', 'most'),
     [(1.1, 0.06, 0.05), (2.45, 0.02, 0.02), (2.45, 0.06, 0.02), (10.0, 0.04, 0.02)],
@@ -297,15 +272,28 @@ def test_the_gait_keeps_its_speed_on_servos_of_any_stiffness(
         assert not rig.faulted
 
 
-@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1)])
-@pytest.mark.parametrize(('mode', 'rightly'), [('walk', 0.9), ('policy', 0.68)])
-def test_odometry_follows_gait_and_policy(mode: str, rightly: float, velocity: Velocity) -> None:
-    """Within 10 % of the way, by noisy joints; a policy lifts its feet by 2 mm."""
+WAYS = Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ('mode', 'velocity', 'slope', 'within', 'rightly'),
+    [
+        *(('walk', velocity, 0.0, 0.1, 0.9) for velocity in WAYS),
+        *(('policy', velocity, 0.0, 0.1, 0.68) for velocity in WAYS),  # lifts its feet by 2 mm
+        # feet stand on the ground and not on the horizon; they creep downhill, unfelt
+        *(('walk', Velocity(0.2), slope, 0.2, 0.0) for slope in (8.0, -8.0)),
+    ],
+)
+def test_odometry_follows_gait_and_policy(
+    mode: str, velocity: Velocity, slope: float, within: float, rightly: float
+) -> None:
+    """Within a tenth of the way, by noisy joints; it tells most contacts of the feet."""
     policy, random = None, Random(1)
     if mode == 'policy':
         stand = GaitGenerator(MODEL, FIRM).stand_targets
         policy = load_policy(find_policy('trot_ppo'), MODEL, stand, PolicyOptions(), PERIOD).runner
-    rig = PhysicsRig(firm(), FIRM, policy) if policy else PhysicsRig()
+    ground = Terrain.slope(math.radians(slope))
+    rig = PhysicsRig(firm(ground), FIRM, policy) if policy or slope else PhysicsRig()
     odometry = LegOdometry(OdometrySettings(), MODEL.foot_radius)
 
     def go(duration: float) -> tuple[OdometryState, float]:
@@ -324,7 +312,7 @@ def test_odometry_follows_gait_and_policy(mode: str, rightly: float, velocity: V
     found = ended.x - begun.x, ended.y - begun.y
     went = end.position[0] - start.position[0], end.position[1] - start.position[1]
     assert math.hypot(*went) > 0.3
-    assert math.dist(found, went) < 0.1 * math.hypot(*went)
+    assert math.dist(found, went) < within * math.hypot(*went)
     assert right > rightly
 
 

@@ -15,14 +15,7 @@ import numpy.typing as npt
 from policy_export import export, Layers
 import pytest
 
-from quad_controller import (
-    find_policy,
-    load_policy,
-    ParameterError,
-    PolicyError,
-    PolicyOptions,
-    Velocity,
-)
+from quad_controller import find_policy, load_policy, PolicyError, PolicyOptions, Velocity
 from quad_controller.policy.contract.mjlab import VENDOR
 from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
@@ -105,27 +98,17 @@ def test_what_disagrees_is_refused_and_named(changes: dict[str, str | None], rea
 @pytest.mark.parametrize('rate', [10.0, 60.0])
 def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
     """50 Hz when the file does not say, else what it says."""
-    for changes, fits in (({}, False), ({'step_dt': f'{1.0 / rate}'}, True)):
-        report = ''
-        try:
-            network = FakeNetwork(metadata(**changes))
-            load_policy(network, ROBOT, STAND, PolicyOptions(), 1.0 / rate)
-        except PolicyError as refusal:
-            report = refusal.reason
-        assert report == (
-            ''
-            if fits
-            else f'loop_rate: {rate:g} Hz instead of 50 Hz ({VENDOR}), or several times that'
-        )
+    stated = FakeNetwork(metadata(step_dt=f'{1.0 / rate}'))
+    load_policy(stated, ROBOT, STAND, PolicyOptions(), 1.0 / rate)
+    with pytest.raises(PolicyError) as refusal:
+        load_policy(FakeNetwork(metadata()), ROBOT, STAND, PolicyOptions(), 1.0 / rate)
+    assert f'loop_rate: {rate:g} Hz instead of 50 Hz ({VENDOR})' in refusal.value.reason
 
 
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
-        (
-            {'observation_terms_scale': '1,1,1,1,1,0.005,1'},
-            '0.005, with three decimals',
-        ),
+        ({'observation_terms_scale': '1,1,1,1,1,0.005,1'}, '0.005, with three decimals'),
         ({'action_scale': '0.004'}, '0.004, with three decimals'),
         ({'decimation': '4', 'latent_dim': '8'}, 'understood: decimation = 4, latent_dim = 8'),
         ({'phase_period': None}, f'0.4, of {VENDOR}'),
@@ -160,13 +143,10 @@ def test_shapes_and_answers_are_looked_at() -> None:
 
 
 def test_the_frame_of_the_imu_is_not_guessed() -> None:
-    """A file that does not say it is refused, with the parameter; the parameter decides."""
-    silent = FakeNetwork(metadata(imu_frame=None))
+    """A file that does not say it is refused, with the parameter."""
     with pytest.raises(PolicyError) as refusal:
-        check(silent)
+        check(FakeNetwork(metadata(imu_frame=None)))
     assert 'terms.ang_vel.frame: frame of the velocity' in refusal.value.reason
-    for frame in (ImuFrame.BASE, ImuFrame.YAWED):
-        assert check(silent, PolicyOptions(imu_frame=frame)).runner.name
 
 
 @pytest.mark.parametrize(
@@ -209,23 +189,35 @@ def test_joints_are_permuted_by_name(order: list[int], moved: int) -> None:
     assert observed[23 + place] == 1.0
 
 
-def test_the_observation_is_as_agreed() -> None:
+@pytest.mark.parametrize(
+    ('frame', 'forward', 'turned', 'phase'),
+    [
+        (ImuFrame.BASE, 0.2, (0.1, 0.2, 0.3), (0.0, -1.0)),
+        (ImuFrame.YAWED, 0.2, (-0.1, -0.2, 0.3), (0.0, -1.0)),  # the vendor's: rates, not gravity
+        (ImuFrame.BASE, 0.05, (0.1, 0.2, 0.3), (0.0, 0.0)),  # below the threshold of the phase
+    ],
+)
+def test_the_observation_is_as_agreed(
+    frame: ImuFrame, forward: float, turned: tuple[float, ...], phase: tuple[float, ...]
+) -> None:
     """ang_vel, gravity, cmd, phase, joint_pos, joint_vel, prev_action, in this order."""
-    network = FakeNetwork(metadata())
-    runner = check(network).runner
+    network = FakeNetwork(metadata(imu_frame=None))
+    runner = check(network, PolicyOptions(imu_frame=frame)).runner
     network.action[0] = np.arange(12) * 0.01
     imu = ImuSample(tilted(0.1).orientation, (0.1, 0.2, 0.3), (0.0, 0.0, 20.0))
-    for _ in range(2):
-        runner.step(
-            Situation(STILL, imu, velocity=Velocity(0.2, -0.1, 0.3)), 0.07
-        )  # a quarter of the period
+    command = Velocity(forward, 0.0, 0.3 if forward > 0.1 else 0.0)
+    for _ in range(2):  # each a quarter of the period
+        runner.step(Situation(STILL, imu, velocity=command), 0.07)
     observed = network.asked[-1][0]
-    assert observed[:3] == pytest.approx([0.1, 0.2, 0.3])
+    assert observed[:3] == pytest.approx(turned)
     # the body is rolled to the right: gravity points to its right side
     assert observed[3:6] == pytest.approx([0.0, -math.sin(0.1), -math.cos(0.1)], abs=1e-6)
-    assert observed[6:9] == pytest.approx([0.2, -0.1, 0.3])
-    assert observed[9:11] == pytest.approx([0.0, -1.0], abs=1e-6)
-    assert observed[35:] == pytest.approx(np.arange(12) * 0.01)
+    assert observed[6:9] == pytest.approx(command)
+    assert observed[9:11] == pytest.approx(phase, abs=1e-6)
+    assert observed[35:] == pytest.approx(np.arange(12) * 0.01, abs=1e-6)
+    runner.step(Situation(STILL, imu, velocity=Velocity(0.2)), 0.07)
+    went_on = network.asked[-1][0][9:11]
+    assert went_on == pytest.approx([-1.0, 0.0], abs=1e-6), 'as if it never was below'
 
 
 def test_a_policy_gives_no_targets_for_what_is_not_measured() -> None:
@@ -248,26 +240,6 @@ def test_a_policy_gives_no_targets_for_what_is_not_measured() -> None:
 
     network.run = broken  # type: ignore[method-assign, assignment]
     assert 'out of order' in runner.step(Situation(STILL, UPRIGHT), PERIOD).reason
-
-
-def test_the_vendors_imu_is_turned_around() -> None:
-    """In the vendor's frame the rates about x and y change their sign; gravity does not."""
-    network = FakeNetwork(metadata())
-    runner = check(network, PolicyOptions(imu_frame=ImuFrame.YAWED)).runner
-    imu = replace(UPRIGHT, angular_velocity=(1.0, 0.5, 0.25))
-    runner.step(Situation(STILL, imu), PERIOD)
-    assert network.asked[-1][0][:3] == pytest.approx([-1.0, -0.5, 0.25])
-    assert network.asked[-1][0][3:6] == pytest.approx([0.0, 0.0, -1.0])
-
-
-def test_a_slow_command_has_no_phase() -> None:
-    """Below the threshold the phase is (0, 0), and above it goes on as if it never was."""
-    network = FakeNetwork(metadata())
-    runner = check(network).runner
-    runner.step(Situation(STILL, UPRIGHT, velocity=Velocity(0.05)), 0.07)
-    assert network.asked[-1][0][9:11].tolist() == [0.0, 0.0]
-    runner.step(Situation(STILL, UPRIGHT, velocity=Velocity(0.2)), 0.07)
-    assert network.asked[-1][0][9:11] == pytest.approx([0.0, -1.0], abs=1e-6)
 
 
 @pytest.mark.parametrize('source', GravitySource)
@@ -316,12 +288,11 @@ def test_joints_that_the_robot_lacks_may_be_held() -> None:
 
 def test_joints_that_the_policy_lacks_stay() -> None:
     """An arm that the policy does not know keeps the targets that it had."""
-    network = FakeNetwork(metadata())
-    options = PolicyOptions()
-    loaded = load_policy(network, ARM_ROBOT, (*STAND, 0.7), options, PERIOD)
-    loaded.runner.reset((*STAND, 0.7))
+    start = (*STAND, 0.7)
+    runner = load_policy(FakeNetwork(metadata()), ARM_ROBOT, start, PolicyOptions(), PERIOD).runner
+    runner.reset(start)
     joints = JointSample((*STAND, 0.1), (0.0,) * 13)
-    targets = loaded.runner.step(Situation(joints, UPRIGHT), PERIOD).targets
+    targets = runner.step(Situation(joints, UPRIGHT), PERIOD).targets
     assert targets is not None
     assert targets[12] == 0.7
 
@@ -335,13 +306,6 @@ def test_a_low_pass_smooths_the_targets() -> None:
     first = runner.step(Situation(STILL, UPRIGHT), PERIOD).targets
     assert first is not None
     assert 0.05 < first[0] - STAND[0] < 0.2
-
-
-@pytest.mark.parametrize('values', [{'phase_period': math.nan}, {'soft_limits': 0.0}])
-def test_odd_options_are_refused(values: dict[str, float]) -> None:
-    """An option that makes no sense is named."""
-    with pytest.raises(ParameterError, match=next(iter(values))):
-        PolicyOptions(**values)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize('mirrored', [False, True])

@@ -32,7 +32,6 @@ from quad_description import (
     RobotState,
     Targets,
 )
-from quad_description.rotations import Vector
 from quad_gait_rig import (
     ARM_ROBOT,
     FOLDED,
@@ -52,7 +51,16 @@ from quad_gait_rig import (
 pytestmark = pytest.mark.slow
 
 FORWARD = Velocity(0.1)
+LYING_FOOT = ROBOT.legs[0].hip[2] - 0.055  # [m]
 SPINNING = replace(UPRIGHT, angular_velocity=(0.0, 9.5, 0.0))
+
+
+def walking(rig: Rig | None = None, mode: str = 'walk') -> Rig:
+    """Return a rig that has walked ahead for a second."""
+    rig = standing(rig)
+    rig.ask(mode)
+    rig.run(1.0, FORWARD)
+    return rig
 
 
 def test_nothing_is_sent_before_the_joints_are_known() -> None:
@@ -73,19 +81,15 @@ def test_a_joint_that_can_never_move_is_refused_with_its_limit() -> None:
 
 
 def test_nothing_moves_before_it_is_asked_to() -> None:
-    """Relaxed, the targets are where the joints were found."""
-    rig = Rig()
-    rig.run(2.0, FORWARD)
-    assert rig.positions == FOLDED
-    assert rig.largest_step == 0.0
+    """Relaxed, the targets are where the joints were found, be it outside of their limits.
 
-
-def test_a_joint_found_outside_its_limits_stays_until_something_is_asked() -> None:
-    """Relaxed it is not pulled in; it never goes further out, and standing up takes it in."""
+    A joint there goes no further out, and standing up takes it in.
+    """
     outside = (ROBOT.limits[0].upper + 0.1, FOLDED[1], ROBOT.limits[2].lower - 0.2, *FOLDED[3:])
-    rig = Rig(positions=outside)
-    rig.run(1.0)
-    assert rig.positions == outside
+    for place in (FOLDED, outside):
+        rig = Rig(positions=place)
+        rig.run(2.0, FORWARD)
+        assert (rig.positions, rig.largest_step) == (place, 0.0)
     further = (outside[0] + 0.5, *outside[1:])
     measured = RobotState(JointSample(further, (0.0,) * 12), UPRIGHT)
     for _ in range(10):
@@ -121,8 +125,7 @@ def test_stands_up_walks_and_lies_down() -> None:
     rig.ask('relax')
     rig.until(State.RELAX, FORWARD)
     assert rig.controller.status.velocity.at_rest
-    feet = ROBOT.feet(rig.positions)
-    assert feet[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
+    assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(LYING_FOOT, abs=1e-6)
     assert [line for line in rig.log if '->' in line] == [
         'stand -> walk', 'walk -> turn', 'turn -> lie', 'lie -> relax',
     ]  # fmt: skip
@@ -130,9 +133,7 @@ def test_stands_up_walks_and_lies_down() -> None:
 
 def test_a_stream_that_breaks_off_stops_the_robot() -> None:
     """Half a second after the last velocity the robot is on its way to rest, and says why."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     rig.run(0.4)
     assert rig.controller.status.velocity.x == pytest.approx(0.1)
     rig.run(0.6)
@@ -142,17 +143,6 @@ def test_a_stream_that_breaks_off_stops_the_robot() -> None:
     assert rig.is_in(State.WALK)
     rig.run(0.5, FORWARD)
     assert rig.controller.status.velocity.x == pytest.approx(0.1)
-
-
-def test_the_same_gait_by_all_of_its_names() -> None:
-    """gait:crawl walks with that gait; a wrong mode is answered with the list of all."""
-    rig = standing()
-    assert 'crawl' in rig.ask('gait:crawl')
-    rig.run(1.0, Velocity(0.02))
-    assert rig.controller.status.gait.value == 'crawl'
-    answer = rig.controller.set_mode('dance')
-    assert not answer.accepted
-    assert all(mode in answer.message for mode in MODES)
 
 
 def test_the_gait_is_tuned_while_nothing_walks() -> None:
@@ -204,15 +194,20 @@ def test_velocities_and_poses_that_are_no_numbers_are_refused(value: float) -> N
     assert rig.controller.status.refused == 2
 
 
-@pytest.mark.parametrize(('mode', 'place'), [('relax', STANDING), ('walk', LYING)])
-def test_joints_that_moved_unseen_are_held_where_they_are_found(mode: str, place: Targets) -> None:
-    """A robot that started anew lies: what was held before would make it rise unasked."""
+@pytest.mark.parametrize(
+    ('mode', 'place', 'asked'),
+    [('relax', STANDING, 'lie'), ('lie', STANDING, 'stand'), ('walk', LYING, 'stand')],
+)
+def test_joints_that_moved_unseen_are_held_where_they_are_found(
+    mode: str, place: Targets, asked: str
+) -> None:
+    """A robot that started anew lies or stands: what was held before would move it unasked."""
     rig = Rig()
     rig.step()
-    if mode == 'walk':
-        rig.ask('walk')
-        rig.until(State.WALK)
-        rig.run(1.0, Velocity(x=0.1))
+    if mode != 'relax':
+        walking(rig).ask(mode)
+        rig.run(3.0, FORWARD)
+        assert rig.is_in(State(mode))
     rig.joints = False
     rig.run(0.3)
     held = rig.positions
@@ -222,7 +217,7 @@ def test_joints_that_moved_unseen_are_held_where_they_are_found(mode: str, place
     rig.run(1.0)
     assert rig.positions == place
     rig.controller.clear_fault()
-    rig.ask('lie' if mode == 'relax' else 'stand')
+    rig.ask(asked)
     rig.run(5.0)
     assert rig.positions != place
 
@@ -242,29 +237,9 @@ def test_joints_that_sag_unseen_or_are_wrong_once_stay_held(off: float, wrong_on
     assert rig.step() == pytest.approx(held)
 
 
-def test_a_robot_that_lay_is_not_folded_again_when_it_is_found_standing() -> None:
-    """The mode is as it was; what moves the robot is the next one that is asked for."""
-    rig = Rig()
-    rig.step()
-    rig.ask('stand')
-    rig.until(State.STAND)
-    rig.run(1.0)
-    stands = rig.positions
-    rig.ask('lie')
-    rig.until(State.LIE)
-    rig.run(3.0)
-    rig.joints = False
-    rig.run(1.0)
-    rig.joints, rig.positions = True, stands
-    rig.run(1.0)
-    assert rig.positions == stands
-
-
 def test_silent_joints_hold_then_fault_and_need_clearing() -> None:
     """The legs stop at 0.2 s, the fault latches at 0.5 s, and nothing moves by itself after."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     rig.joints = False
     rig.run(0.3, FORWARD)
     held = rig.positions
@@ -286,9 +261,7 @@ def test_silent_joints_hold_then_fault_and_need_clearing() -> None:
 
 def test_a_short_gap_is_survived() -> None:
     """After 0.3 s of silence the robot walks on."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     rig.joints = False
     rig.run(0.3, FORWARD)
     rig.joints = True
@@ -302,9 +275,7 @@ def test_a_short_gap_is_survived() -> None:
 
 def test_a_short_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> None:
     """After 0.4 s without a step it walks on; there is no fault."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     before = rig.positions
     targets = rig.controller.step(RobotState(), 0.4).targets
     assert targets is not None
@@ -335,10 +306,8 @@ def test_old_messages_in_a_burst_after_a_pause_are_no_fault_and_late_ones_are() 
 
 
 @pytest.mark.parametrize('goal', ['walk', 'lie', 'policy'])
-def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_is(
-    goal: str,
-) -> None:
-    """The hardware node has moved the legs meanwhile: what was wanted before does not count."""
+def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down(goal: str) -> None:
+    """From where it is: the hardware node has moved the legs, what was wanted does not count."""
     rig = standing(policy_rig()[0])
     rig.ask(goal)
     rig.run(0.8, FORWARD)
@@ -358,9 +327,7 @@ def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_
 @pytest.mark.parametrize('case', ['fallen', 'joints lost', 'cleared'])
 def test_after_a_pause_with_a_foot_in_the_air_nothing_is_lifted_again(case: str) -> None:
     """A fault holds a robot in mid-trot: the hardware node lays it down, if that goes on."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     while not raised_feet(ROBOT.feet(rig.positions)):
         rig.step(FORWARD)
     if case == 'fallen':
@@ -388,22 +355,9 @@ def test_after_a_pause_with_a_foot_in_the_air_nothing_is_lifted_again(case: str)
         assert rig.positions == pytest.approx(found)
 
 
-def test_a_pause_of_a_robot_that_stands_in_a_fault_leaves_it_so() -> None:
-    """On all its feet nobody lays it down."""
-    rig = standing()
-    rig.imu = None
-    rig.run(1.0)
-    assert rig.is_in(State.FAULT)
-    before = rig.positions
-    assert rig.controller.step(RobotState(), 3.0).targets == pytest.approx(before)
-    assert not any('pause' in text for text in rig.controller.status.faults)
-
-
 def test_stand_is_where_all_feet_stand() -> None:
     """A robot that walked is on its way there until its gait has ended."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     rig.ask('stand')
     titles: list[str] = []
     while not titles or titles[-1] != 'stand':
@@ -417,14 +371,19 @@ def test_stand_is_where_all_feet_stand() -> None:
     assert rig.positions == pytest.approx(resting, abs=0.02)
 
 
-def test_a_pause_at_rest_is_no_fault() -> None:
-    """Standing in mode walk, as it stood before; the velocity of before the pause is stale."""
-    rig = standing()
-    rig.ask('walk')
+@pytest.mark.parametrize('state', [State.WALK, State.FAULT])
+def test_a_pause_at_rest_is_no_fault(state: State) -> None:
+    """On all its feet it stands as before; the velocity of before the pause is stale."""
+    rig = standing(mode='walk')
+    if state is State.FAULT:
+        rig.imu = None
+        rig.run(1.0)
+    assert rig.is_in(state)
+    before = rig.positions
+    assert rig.controller.step(RobotState(), 3.0).targets == pytest.approx(before)
     rig.run(1.0)
-    assert rig.controller.step(RobotState(), 2.0).targets is not None
-    rig.run(1.0)
-    assert rig.is_in(State.WALK)
+    assert rig.is_in(state)
+    assert not any('pause' in text for text in rig.controller.status.faults)
 
 
 @pytest.mark.parametrize('dts', [(0.15,), (0.3,), (1.0,), (0.3, 0.02)])
@@ -493,9 +452,7 @@ def test_what_lasts_is_a_fault_with_its_reaction(
     imu: ImuSample | None, battery: float, words: str, mode: str
 ) -> None:
     """A walk ends in standing, at once where it is, or lying; one sample does nothing."""
-    rig = standing()
-    rig.ask('walk')
-    rig.run(1.0, FORWARD)
+    rig = walking()
     rig.imu, rig.battery = imu, battery
     rig.run(0.06, FORWARD)
     rig.imu, rig.battery = UPRIGHT, 0.9
@@ -506,13 +463,12 @@ def test_what_lasts_is_a_fault_with_its_reaction(
     held = rig.positions
     rig.run(5.0, FORWARD)
     assert words in rig.controller.clear_fault().message
-    lying = ROBOT.legs[0].hip[2] - 0.055
     if mode == 'stand':
         assert rig.positions == pytest.approx(STAND, abs=1e-3)
     elif mode == 'relax':
         assert rig.positions == held
     else:
-        assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(lying, abs=1e-6)
+        assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(LYING_FOOT, abs=1e-6)
     rig.imu, rig.battery = UPRIGHT, 0.9
     rig.step()
     assert rig.controller.clear_fault().message == f'cleared; the mode is {mode}'
@@ -520,11 +476,11 @@ def test_what_lasts_is_a_fault_with_its_reaction(
 
 def test_a_servo_that_gives_up_ends_the_walk_and_lies_down() -> None:
     """Limp or hot, as the hardware node says; it stands up again when that is over."""
-    rig = standing(mode='walk')
+    rig = walking()
     rig.servo_problem = 'servo silent: look at the cable of the leg that hangs limp'
     rig.until(State.FAULT, FORWARD)
     rig.run(5.0, FORWARD)
-    assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
+    assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(LYING_FOOT, abs=1e-6)
     assert 'servo silent' in rig.controller.set_mode('stand').message
     rig.servo_problem = ''
     rig.step()
@@ -547,16 +503,6 @@ def test_limits_and_slew_of_velocities_count_for_a_policy() -> None:
     rig.controller.stop()
     rig.step(Velocity(0.35))
     assert policy.velocities[-1] == Velocity()
-
-
-def test_an_attitude_may_be_done_without() -> None:
-    """With require_imu off the robot walks without it."""
-    parameters = StateParameters(require_imu=False)
-    rig = Rig(Controller(ROBOT, GaitParameters(), parameters))
-    rig.imu = None
-    standing(rig).ask('walk')
-    rig.run(1.0, FORWARD)
-    assert rig.is_in(State.WALK)
 
 
 def test_messages_of_no_use_are_the_reason_of_the_silence() -> None:
@@ -593,19 +539,13 @@ def test_a_robot_that_is_carried_while_relaxed_is_no_fault() -> None:
     assert 'put it on its feet' in rig.controller.set_mode('stand').message
 
 
-def lying_down() -> Rig:
-    """Return a rig that is folding its legs."""
+def test_joints_lost_while_lying_down_are_a_fault() -> None:
+    """The legs stop and do not go on by themselves when the joint states come back."""
     rig = standing()
     rig.ask('lie')
     rig.until(State.LIE)
     rig.run(0.3)
     assert rig.controller.status.title == 'to lie'
-    return rig
-
-
-def test_joints_lost_while_lying_down_are_a_fault() -> None:
-    """The legs stop and do not go on by themselves when the joint states come back."""
-    rig = lying_down()
     rig.joints = False
     rig.run(0.25)
     held = rig.positions
@@ -669,19 +609,6 @@ def test_other_joints_stay_where_they_are_or_go_where_commanded() -> None:
         Controller(ARM_ROBOT, GaitParameters(), StateParameters(), arm_pose=(1.0, 2.0))
 
 
-def test_the_policy_is_entered_and_left_from_standing() -> None:
-    """It is reset, gets the velocity, and gets none on the way out."""
-    rig, policy = policy_rig()
-    standing(rig).ask('policy')
-    rig.until(State.POLICY)
-    assert policy.resets == 1
-    rig.run(1.0, FORWARD)
-    assert policy.velocities[-1] == FORWARD
-    rig.ask('walk')
-    rig.until(State.WALK, FORWARD)
-    assert policy.velocities[-1].at_rest
-
-
 @pytest.mark.parametrize('walks', [False, True])
 def test_a_policy_that_fails_is_replaced_by_the_gait(walks: bool) -> None:
     """Two bad answers are bridged, three in a row end it, without a jump and with the reason."""
@@ -695,37 +622,6 @@ def test_a_policy_that_fails_is_replaced_by_the_gait(walks: bool) -> None:
     rig.run(2.0, FORWARD)
     assert rig.is_in(State.WALK if walks else State.STAND)
     assert 'the policy was given up: broken on purpose' in rig.log
-
-
-def test_a_dry_run_watches_the_policy_only() -> None:
-    """The policy's targets are published beside those of the gait, and its mode is refused."""
-    policy = StillPolicy(STAND)
-    controller = Controller(
-        ROBOT, GaitParameters(), StateParameters(), policy=policy, dry_run=True
-    )
-    rig = standing(Rig(controller))
-    output = controller.step(RobotState(JointSample(rig.positions, (0.0,) * 12), UPRIGHT), PERIOD)
-    assert output.shadow == STAND
-    assert 'dry run' in controller.set_mode('policy').message
-
-
-@pytest.mark.parametrize(
-    ('velocities', 'turning', 'reason'),
-    [(None, UPRIGHT.angular_velocity, 'velocities of the joints'), ((0.0,) * 12, None, '/imu')],
-)
-def test_a_policy_is_given_nothing_that_is_not_measured(
-    velocities: tuple[float, ...] | None, turning: Vector | None, reason: str
-) -> None:
-    """Without joint velocities or turning its mode is refused; the gait walks without them."""
-    rig = standing(policy_rig()[0])
-    measured = RobotState(
-        JointSample(rig.positions, velocities), replace(UPRIGHT, angular_velocity=turning)
-    )
-    rig.controller.step(measured, PERIOD)
-    assert reason in rig.controller.set_mode('policy').message
-    assert rig.controller.set_mode('walk').accepted
-    unwatched = [text for text in rig.controller.status.warnings if 'max_turn_rate' in text]
-    assert bool(unwatched) == (turning is None)
 
 
 def test_an_attitude_whose_signs_nobody_knows_is_not_acted_upon() -> None:
@@ -751,15 +647,6 @@ def test_an_attitude_whose_signs_nobody_knows_is_not_acted_upon() -> None:
     rig.imu = replace(tilted(1.2), deviation=1.57)
     rig.run(0.3)
     assert rig.is_in(State.FAULT)
-
-
-@pytest.mark.parametrize(
-    'values', [{'period': 0.0}, {'max_tilt': math.nan}, {'warn_age': 0.4}, {'hold_age': 0.6}]
-)
-def test_odd_parameters_are_refused(values: dict[str, float]) -> None:
-    """A parameter that makes no sense is named."""
-    with pytest.raises(ParameterError, match=next(iter(values))):
-        StateParameters(**values)  # type: ignore[arg-type]
 
 
 wild = st.floats(allow_nan=True, allow_infinity=True)

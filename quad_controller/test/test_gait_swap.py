@@ -121,15 +121,17 @@ def test_a_policy_that_fails_is_no_obstacle() -> None:
 
 
 def test_a_policy_that_misses_a_measurement_is_refused_before_the_robot_stands() -> None:
-    """What is followed goes on."""
-    rig = standing(mode='walk')
+    """What is followed goes on; the mode is refused, too, and the missing turn rate reported."""
+    rig = standing(policy_rig()[0], 'walk')
     rig.imu = replace(tilted(0.0), angular_velocity=None)
     rig.step()
+    former, missing = rig.controller.policy, 'a policy needs what /imu does not have'
     answer = rig.controller.follow(good())
-    assert not answer.accepted
-    assert answer.message == 'stays as it is: a policy needs what /imu does not have'
-    assert rig.controller.policy is None
+    assert (answer.accepted, answer.message) == (False, f'stays as it is: {missing}')
+    assert rig.controller.policy is former
+    assert missing in rig.controller.set_mode('policy').message
     assert rig.is_in(State.WALK)
+    assert any('max_turn_rate' in text for text in rig.controller.status.warnings)
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 import csv
 from dataclasses import replace
-import io
 import math
 from pathlib import Path
 import re
@@ -21,7 +20,7 @@ from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.model import CommandRanges, Gains
-from quad_controller.policy.options import gain_rows, ServoResponse, table_text
+from quad_controller.policy.options import gain_rows, ServoResponse
 from quad_controller.policy_check.arenas import (
     Conditions,
     PhysicsArena,
@@ -37,18 +36,9 @@ from quad_controller.policy_check.course import (
     CourseWalker,
     Passage,
 )
-from quad_controller.policy_check.findings import (
-    against_gait,
-    Compared,
-    figures_table,
-    Findings,
-    is_too_late,
-    timing_notes,
-    tracking_table,
-    write_csv,
-)
+from quad_controller.policy_check.findings import against_gait, is_too_late, timing_notes
 from quad_controller.policy_check.main import ExitCode, run
-from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
+from quad_controller.policy_check.trial import Candidate, run_trials, Trial
 from quad_description import robot_urdf, RobotState
 from quad_gait_rig import metadata, ROBOT, write_policy
 from quad_hardware import NoAnswerError
@@ -78,12 +68,6 @@ def test_a_course_has_what_a_policy_was_trained_for() -> None:
     assert course_for(ranges)[:4] == tuple(map(Velocity, speeds))
     assert all(each.yaw >= 0.0 for each in course_for(ranges))
     assert {axis_of(each) for each in course_for(ranges)} == {'forward', 'turn'}
-
-
-def test_minutes_are_shared_among_those_who_walk() -> None:
-    """The shortest that the command takes is enough for every command."""
-    assert chain_duration(0.8, 2, 12) > 0.5
-    assert chain_duration(2.0, 2, 9) == pytest.approx((60.0 - 3.5) / 9 - 1.0)
 
 
 @pytest.mark.slow
@@ -143,13 +127,12 @@ class Interrupted(PhysicsArena):
 
     @property
     def interruption(self) -> str:
-        """What it did."""
+        """The pause, unless none is left."""
         self.times -= 1
         return 'a pause of 0.7 s' if self.times >= 0 else ''
 
     @interruption.setter
-    def interruption(self, _: str) -> None:
-        pass
+    def interruption(self, _: str) -> None: ...
 
 
 @pytest.mark.slow
@@ -256,11 +239,11 @@ def test_a_policy_that_does_worse_than_the_gait_does_not(
 
 def test_late_commands_are_named_and_say_nothing_of_a_policy() -> None:
     """Without clocks there is nothing to name."""
-    late = replace(FAIR, timing=CommandTiming((0.004, 0.005, 0.006), (0.03, 0.03, 0.03)))
-    notes = ' '.join(timing_notes(course(late)))
+    late = course(replace(FAIR, timing=CommandTiming((0.004, 0.005, 0.006), (0.03,) * 3)))
+    notes = ' '.join(timing_notes(late))
     assert '5.0 ms (median), goal 3 ms' in notes
     assert '30.0 ms off their period' in notes
-    assert is_too_late(course(late), 0.02)
+    assert is_too_late(late, 0.02)
     fine = replace(FAIR, timing=CommandTiming((0.001,), (0.001,)))
     assert list(timing_notes(course(fine, fine))) == list(timing_notes(course())) == []
     assert not is_too_late(course(), 0.02)
@@ -302,66 +285,22 @@ def test_other_gains_than_those_of_the_servos_are_named_with_what_they_do(
         assert word in row.found
 
 
-def test_unknown_gains_are_not_compared() -> None:
-    """Those of the training are shown, or that they are not stated."""
-    (unstated,) = gain_rows(None, FIRM, 0.02)
-    assert unstated.found == 'not stated'
-    assert list(gain_rows(None, None, 0.02)) == []
-    (shown,) = gain_rows(Gains((10.0,), (0.3,)), None, 0.02)
-    assert shown.found == '10 N m/rad, 0.3 N m s/rad'
-
-
-# --- the report
-
-
-def rows_of(text: str) -> list[dict[str, str]]:
-    """Return the rows of a report by their headings."""
-    return list(csv.DictReader(text.splitlines()))
-
-
-def test_the_report_has_a_row_for_each_command_of_each_walker() -> None:
-    """With what was tried, commanded and measured; what was not measured is empty."""
-    turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
-    pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
-    walked = course(replace(FAIR, went=Velocity(0.25)))
-    file = io.StringIO()
-    write_csv(file, Findings(courses=[pair], walks=[walked]))
-    walk, forward, turned, *others = rows_of(file.getvalue())
-    assert walk['tried'] == 'walk'
-    assert float(walk['went x [m/s]']) == 0.25
-    assert (walk['falls'], forward['latency p50 [s]']) == ('0', '')
-    assert (forward['walker'], forward['axis'], turned['axis']) == ('policy', 'forward', 'turn')
-    assert float(turned['commanded yaw [rad/s]']) == 1.0
-    assert float(forward['cost of transport']) == FAIR.cost_of_transport
-    assert [each['walker'] for each in others] == ['gait', 'gait']
-
-
-def test_tables_have_a_dash_for_what_was_not_measured() -> None:
-    """As text, columns stand under each other; times of commands need a wire."""
-    lost = replace(FAIR, went=Velocity(math.nan, math.nan, math.nan), time=0.0)
-    assert tracking_table(Compared('', course(lost), course()))[1] == (
-        *('forward', '+0.200 m/s', '-', '-', '+0.190', '0.010'),
-    )
-    lines = table_text(figures_table(Compared('', course(), course())), numbers=True).splitlines()
-    assert len({len(line) for line in lines}) == 1
-    assert not any('observation' in line for line in lines)
-    timed = course(replace(FAIR, timing=CommandTiming((0.002,), (0.001,))))
-    titles = [row[0] for row in figures_table(Compared('', timed, timed))]
-    assert 'observation to command, p50 [ms]' in titles
-
-
 @pytest.mark.slow
 def test_a_policy_that_walks_nowhere_does_not_stand_up_beside_the_gait(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The report alone means a course in virtual time."""
+    """The report has a row for each command of each walker; what was not measured is empty."""
     still, report = write_policy(tmp_path / 'still.onnx', metadata()), tmp_path / 'report.csv'
     assert run([str(still), '--duration', '1', '--report', str(report)]) == ExitCode.DOES_NOT
     output = capsys.readouterr().out
     assert 'does not stand up:\n' in output
     assert 'hardly any' in output
     assert 'not stated' in output, 'the gains'
-    rows = rows_of(report.read_text(encoding='utf-8'))
-    assert len(rows) == 2 * len(course_for(None))
-    slow = next(row for row in rows if row['walker'] == 'policy' and row['axis'] == 'forward')
+    rows = list(csv.DictReader(report.read_text(encoding='utf-8').splitlines()))
+    walked = [(walker, command) for walker in ('policy', 'gait') for command in course_for(None)]
+    for row, (walker, command) in zip(rows, walked, strict=True):
+        assert (row['walker'], row['axis']) == (walker, axis_of(command))
+        assert float(row['commanded yaw [rad/s]']) == pytest.approx(command.yaw, abs=1e-3)
+        assert (row['falls'], row['latency p50 [s]']) == ('0', '')
+    slow = next(row for row in rows if row['axis'] == 'forward')
     assert abs(float(slow['went x [m/s]'])) < 0.05
