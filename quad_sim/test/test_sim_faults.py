@@ -229,12 +229,6 @@ def test_a_fault_without_sense_is_refused(text: str, message: str) -> None:
         parse_fault(text)
 
 
-def test_a_fault_from_words() -> None:
-    """Times among the settings go before those of the call."""
-    fault = make_fault('slow', ['delay=0.1', 'for=3'], start=7.0, duration=1.0)
-    assert (fault.kind, fault.start, fault.duration, fault['delay']) == (FaultKind.SLOW, 7, 3, 0.1)
-
-
 def test_an_unplugged_port_goes_and_comes_back(tmp_path: Path) -> None:
     """Who has it open sees a hang-up; the path comes back, and the robot has lived on."""
     with serve(tmp_path / 'xgo', *KINEMATIC) as served:

@@ -59,53 +59,45 @@ def fake_xgo(
 
 
 def test_it_works_without_ros_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    """Without ROS nothing of it is imported; SIGTERM ends it with 0 and takes the path away."""
+    """Without ROS nothing of it is imported; SIGTERM ends it with 0 and takes the path away.
+
+    It reports that it is ready at the socket of sd_notify(3), as a supervisor or systemd wants it.
+    """
     link = tmp_path / 'xgo'
-    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
-        maps = Path(f'/proc/{process.pid}/maps').read_text(encoding='utf-8')
-        assert 'librcl.so' not in maps
-        assert 'libmujoco' not in maps
-        listener = Listener(link)
-        listener.send(VERSION)
-        (answer,) = listener.count(1)
-        assert answer.payload.startswith(b'L-')
-        listener.close()
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(TEST_TIMEOUT) == 0
-    assert not os.path.lexists(link)
-
-
-def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> None:
-    """Two robots do not share a path; what a killed one left behind is no hindrance."""
-    link = tmp_path / 'xgo'
-    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
-        command = [sys.executable, '-m', 'quad_sim.fake_xgo', '--no-ros']
-        second = subprocess.run(
-            [*command, '--physics', 'none', '--link', str(link)],
-            cwd=PACKAGE,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert second.returncode == 2
-        assert 'belongs to another simulated robot' in second.stderr
-        process.kill()
-        process.wait(TEST_TIMEOUT)
-    assert link.is_symlink()
-    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(TEST_TIMEOUT) == 0
-
-
-def test_it_reports_that_it_is_ready(tmp_path: Path) -> None:
-    """Without ROS, too: at the socket of sd_notify(3), as a supervisor or systemd wants it."""
     environment = {**os.environ, 'NOTIFY_SOCKET': str(tmp_path / 'notify')}
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
         supervisor.bind(environment['NOTIFY_SOCKET'])
         supervisor.settimeout(TEST_TIMEOUT)
-        options = ('--physics', 'none', '--no-ros')
-        with fake_xgo(tmp_path / 'xgo', *options, env=environment):
+        with fake_xgo(link, '--no-ros', '--physics', 'none', env=environment) as process:
             assert supervisor.recv(100) == b'READY=1'
+            maps = Path(f'/proc/{process.pid}/maps').read_text(encoding='utf-8')
+            assert 'librcl.so' not in maps
+            assert 'libmujoco' not in maps
+            listener = Listener(link)
+            listener.send(VERSION)
+            (answer,) = listener.count(1)
+            assert answer.payload.startswith(b'L-')
+            listener.close()
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(TEST_TIMEOUT) == 0
+    assert not os.path.lexists(link)
+
+
+def test_a_path_in_use_is_refused_and_a_dead_one_replaced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two robots do not share a path; what a killed one left behind is no hindrance."""
+    link = tmp_path / 'xgo'
+    alone = '--no-ros', '--physics', 'none'
+    with fake_xgo(link, *alone) as process:
+        assert run([*alone, '--link', str(link)]) == 2
+        assert 'belongs to another simulated robot' in capsys.readouterr().err
+        process.kill()
+        process.wait(TEST_TIMEOUT)
+    assert link.is_symlink()
+    with fake_xgo(link, *alone) as process:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(TEST_TIMEOUT) == 0
 
 
 @pytest.mark.parametrize(
@@ -140,24 +132,17 @@ def test_an_option_without_sense_is_reported(
     assert not os.path.lexists(link)
 
 
-def test_a_file_in_the_way_is_left_alone(
+def test_what_is_in_the_way_is_left_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What is no link is never removed."""
-    link = tmp_path / 'xgo'
-    link.write_text('precious', encoding='utf-8')
-    assert run(['--no-ros', '--physics', 'none', '--link', str(link)]) == 2
-    assert link.read_text(encoding='utf-8') == 'precious'
-    missing = tmp_path / 'no' / 'folder'
-    assert run(['--no-ros', '--physics', 'none', '--link', str(missing)]) == 2
-    assert 'cannot be made' in capsys.readouterr().err
-
-
-def test_a_link_to_something_else_is_left_alone(tmp_path: Path) -> None:
-    """A link that no simulated robot has made is not replaced, even if it leads nowhere."""
-    link = tmp_path / 'xgo'
+    """A file is never removed, nor a link that no simulated robot made and leads nowhere."""
+    file, link, missing = tmp_path / 'file', tmp_path / 'link', tmp_path / 'no' / 'folder'
+    file.write_text('precious', encoding='utf-8')
     link.symlink_to('/dev/ttyUSB99')
-    assert run(['--no-ros', '--physics', 'none', '--link', str(link)]) == 2
+    for path in (file, link, missing):
+        assert run(['--no-ros', '--physics', 'none', '--link', str(path)]) == 2
+    assert 'cannot be made' in capsys.readouterr().err
+    assert file.read_text(encoding='utf-8') == 'precious'
     assert str(link.readlink()) == '/dev/ttyUSB99'
 
 

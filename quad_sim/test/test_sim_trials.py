@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import math
 from pathlib import Path
 import time
@@ -19,7 +18,7 @@ from quad_hardware.protocol import Code, Frame, Kind
 from quad_sim import CommandTiming, ServedRobot, ServoModel, SimulationError, Terrain
 from quad_sim.env import WalkingEnv
 from quad_sim.options import build, parse_arguments
-from quad_sim.physics import Meter, PhysicsBackend, Robot, Variation
+from quad_sim.physics import Meter, Robot, Variation
 from quad_sim.robot_line import CommandTimes
 
 URDF = robot_urdf()
@@ -80,25 +79,6 @@ def test_the_friction_of_bumps_varies_too() -> None:
         robot.step(0.5)
         ways.append(robot.base_pose.position[0] - start)
     assert ways[1] > 2.0 * ways[0]
-
-
-@pytest.mark.parametrize(('delay', 'late'), [(0.0, 0), (0.008, 0), (0.02, 1), (0.05, 2)])
-def test_targets_arrive_after_their_delay_and_in_their_order(delay: float, late: int) -> None:
-    """Each of them, also when several are on the way at once."""
-    backend = PhysicsBackend(Robot(URDF, replace(ServoModel.FIRM.parameters, delay=delay)))
-    backend.reset()
-    robot, stand = backend.robot, list(backend.robot.joint_positions)
-    sent = [[q + 0.01 * (step + 1) for q in stand] for step in range(6)]
-    seen = []
-    for targets in sent:
-        backend.step(targets)
-        seen.append(float(robot._ramp.goal[0] - stand[0]))
-    expected = [0.0] * late + [0.01 * (step + 1) for step in range(6 - late)]
-    assert seen == pytest.approx(expected, abs=1e-9)
-    assert robot.time == pytest.approx(6 * backend.period)
-    backend.reset()
-    backend.step(None)
-    assert robot._ramp.goal == pytest.approx(stand), 'what was on the way before a reset is gone'
 
 
 def test_the_meter_adds_up_way_work_and_limits() -> None:

@@ -81,15 +81,6 @@ def test_the_trunk_gets_heavier(urdf: str) -> None:
     assert abs(heavy.base_velocity.linear[1]) < 0.8 * abs(plain.base_velocity.linear[1])
 
 
-def test_the_next_reset_forgets_it() -> None:
-    """Bit for bit."""
-    robot = Robot(robot_urdf())
-    robot.reset(variation=Variation(0.2, 1.5, 0.6, 1.5))
-    settled(robot)
-    robot.reset()
-    assert settled(robot) == settled(Robot(robot_urdf()))
-
-
 def test_a_servo_that_was_off_holds_with_its_own_stiffness() -> None:
     """That of the variation."""
     one, other = Robot(robot_urdf()), Robot(robot_urdf())
