@@ -105,10 +105,7 @@ IN_RPM = 'scale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472'
     [
         ('mandatory: false', (1.0, 1.0)),
         (POSITIONS, (1.0, 1.0)),
-        (
-            f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5',
-            (1.0, 1.0),
-        ),
+        (f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5', (1.0, 1.0)),
         (f'{POSITIONS}\n{IN_RPM}', (6000.0, 6000.0)),
         (f'{POSITIONS}\n{IN_RPM}\nscale_acc_to_dev: 5729.58', (6000.0, 10.0)),
         (f'{POSITIONS}\nscale_acc_from_dev: 1.745329e-6', (1.0, 0.1)),

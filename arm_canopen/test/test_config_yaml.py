@@ -63,10 +63,7 @@ def bus_with(section: str = '', **keys: Any) -> dict[str, Any]:
     """Return a bus of one drive, with keys in one of its sections."""
     sections: dict[str, dict[str, Any]] = {
         'options': {},
-        'master': {
-            'node_id': 1,
-            'driver': 'ros2_canopen::MasterDriver',
-        },
+        'master': {'node_id': 1, 'driver': 'ros2_canopen::MasterDriver'},
         'device': {'node_id': 2, 'driver': 'ros2_canopen::Cia402Driver', 'dcf': 'drive.eds'},
         'tpdo': {'mapping': [{'index': 0x6041}]},
         'rpdo': {'mapping': [{'index': 0x6040}]},

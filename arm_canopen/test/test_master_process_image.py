@@ -18,10 +18,7 @@ from canopen_core.can import Frame
 from canopen_core.standard import DataType, is_controlword, MappedObject
 
 CONTROLWORD, MODE, TARGET, VELOCITY = 0x6040, 0x6060, 0x607A, 0x60FF
-TPDOS = (
-    pdo(1, 0x182, (0x6041, 0), (0x6061, 0)),
-    pdo(2, 0x282, (0x6064, 0), (0x606C, 0)),
-)
+TPDOS = (pdo(1, 0x182, (0x6041, 0), (0x6061, 0)), pdo(2, 0x282, (0x6064, 0), (0x606C, 0)))
 RPDOS = (
     pdo(1, 0x202, (CONTROLWORD, 0), (MODE, 0)),
     pdo(2, 0x302, (TARGET, 0), (VELOCITY, 0)),

@@ -4,13 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
-from pathlib import Path
+from drive_samples import drive_dictionary, DRIVE_EDS
 
 from arm_canopen import DriveState
 from canopen_core.can import Frame
-from canopen_core.eds import load_eds
 from canopen_core.standard import (
     drive_state,
     nmt_frame,
@@ -20,34 +17,13 @@ from canopen_core.standard import (
     sdo,
 )
 from canopen_sim import Device, Drive, Fault, FaultInjection
+from canopen_sim.object_store import ParameterMemory
 
-EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+EDS = DRIVE_EDS
 NODE_ID = 5
 
-SHUTDOWN = 0x06
-SWITCH_ON = 0x07
-ENABLE = 0x0F
-QUICK_STOP = 0x02
-DISABLE_VOLTAGE = 0x00
-FAULT_RESET = 0x80
-
-
-@cache
-def drive_dictionary() -> ObjectDictionary:
-    """Read the EDS of the simulated drive, once."""
-    return load_eds(EDS).dictionary
-
-
-def with_defaults(
-    dictionary: ObjectDictionary, defaults: dict[tuple[int, int], int]
-) -> ObjectDictionary:
-    """Return a dictionary with other defaults."""
-    return ObjectDictionary(
-        replace(entry, default=defaults.get(entry.address, entry.default), node_relative=False)
-        if entry.address in defaults
-        else entry
-        for entry in dictionary
-    )
+SHUTDOWN, SWITCH_ON, ENABLE = 0x06, 0x07, 0x0F
+QUICK_STOP, DISABLE_VOLTAGE, FAULT_RESET = 0x02, 0x00, 0x80
 
 
 class RefusedError(Exception):
@@ -67,7 +43,7 @@ class Rig:
         *,
         node_id: int = NODE_ID,
         boot_time: float = 0.0,
-        power: bool = True,
+        memory: ParameterMemory | None = None,
         rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         self.now = 100.0  # virtual time in [s]
@@ -78,10 +54,10 @@ class Rig:
             drive_dictionary() if dictionary is None else dictionary,
             self._sent,
             boot_time=boot_time,
+            memory=memory,
             rate_units={0: rate_units},
         )
-        if power:
-            self.device.advance(self.now)
+        self.device.advance(self.now)
 
     def _sent(self, frame: Frame) -> None:
         self.sent.append((self.now, frame))
@@ -200,8 +176,7 @@ class Rig:
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:
         """Write a number in the size that the object has."""
-        variable = self.device.store.find(index, subindex)
-        size = variable.size
+        size = self.device.store.find(index, subindex).size
         assert size is not None
         self.write(index, subindex, (value % (1 << 8 * size)).to_bytes(size, 'little'))
 
@@ -220,7 +195,7 @@ class Rig:
 
     @property
     def nmt_state(self) -> NmtState:
-        """NMT state of the device."""
+        """State of the device."""
         return self.device.nmt_state
 
     @property

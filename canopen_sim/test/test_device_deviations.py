@@ -7,16 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from device_rig import (
-    drive_dictionary,
-    EDS,
-    ENABLE,
-    FAULT_RESET,
-    NODE_ID,
-    Rig,
-    SHUTDOWN,
-    SWITCH_ON,
-)
+from device_rig import EDS, ENABLE, FAULT_RESET, NODE_ID, Rig, SHUTDOWN, SWITCH_ON
+from drive_samples import drive_dictionary
 import pytest
 
 from arm_canopen import DriveState

@@ -15,7 +15,8 @@ import threading
 import time
 
 from can_addresses import free_virtual
-from device_rig import drive_dictionary, NODE_ID, with_defaults
+from device_rig import NODE_ID
+from drive_samples import drive_dictionary, with_defaults
 import pytest
 
 from arm_canopen import BusError, CanopenError

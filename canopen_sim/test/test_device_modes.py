@@ -4,15 +4,8 @@
 
 from __future__ import annotations
 
-from device_rig import (
-    drive_dictionary,
-    ENABLE,
-    RefusedError,
-    Rig,
-    SHUTDOWN,
-    SWITCH_ON,
-    with_defaults,
-)
+from device_rig import ENABLE, RefusedError, Rig, SHUTDOWN, SWITCH_ON
+from drive_samples import drive_dictionary, with_defaults
 import pytest
 
 from arm_canopen import OperationMode

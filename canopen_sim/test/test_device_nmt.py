@@ -6,19 +6,13 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from device_rig import drive_dictionary, NODE_ID, Rig
+from device_rig import NODE_ID, Rig
+from drive_samples import drive_dictionary, with_defaults
 import pytest
 
 from arm_canopen import DriveState
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    AbortCode,
-    DataType,
-    NmtCommand,
-    NmtState,
-    ObjectDictionary,
-    ObjectEntry,
-)
+from canopen_core.standard import AbortCode, NmtCommand, NmtState, ObjectDictionary
 from canopen_sim import Fault
 
 PRE, OP, STOP = NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED
@@ -60,29 +54,17 @@ def test_every_state_and_command(before: NmtState, command: NmtCommand) -> None:
 
 
 @pytest.mark.parametrize('state', PATHS)
-def test_commands_to_others_are_ignored(state: NmtState) -> None:
-    """A device executes commands for its own id and 0, and nothing else."""
+def test_what_is_no_command_is_ignored(state: NmtState) -> None:
+    """Commands to others, wrong lengths, unknown specifiers and no plain data frames."""
     rig = rig_in(state)
     for command in NmtCommand:
         rig.nmt(command, NODE_ID + 1)
+    for data in (b'', b'\x01', b'\x01\x05\x00', b'\x03\x05', b'\xff\x05'):
+        rig.send(0, data)
+    for kind in ('is_extended', 'is_remote', 'is_error'):
+        for data in (b'\x01\x00', b'\x02\x00'):
+            rig.device.receive(Frame(0, data, **{kind: True}), rig.now)  # type: ignore[arg-type]
     assert rig.nmt_state is state
-    assert rig.take() == []
-
-
-@pytest.mark.parametrize(
-    'frame',
-    [
-        *(Frame(0, data) for data in (b'', b'\x01', b'\x01\x05\x00', b'\x03\x05', b'\xff\x05')),
-        Frame(0, b'\x01\x00', is_extended=True),
-        Frame(0, b'\x01\x00', is_remote=True),
-        Frame(0, b'\x01\x00', is_error=True),
-    ],
-)
-def test_what_is_no_command_is_ignored(frame: Frame) -> None:
-    """Wrong lengths, unknown command specifiers and frames that are no plain data frames."""
-    rig = rig_in(PRE)
-    rig.device.receive(frame, rig.now)
-    assert rig.nmt_state is PRE
     assert rig.take() == []
 
 
@@ -99,57 +81,39 @@ def test_commands_during_initialisation() -> None:
     assert rig.nmt_state is PRE
 
 
-def answers_sdo(rig: Rig) -> bool:
-    """Return whether the device serves SDOs."""
-    return rig.raw_sdo(b'\x40\x00\x10\x00\x00\x00\x00\x00') is not None
-
-
 def test_services_of_each_state() -> None:
     """SDO is served but in Stopped, PDOs only in Operational (CiA 301, table 46)."""
     rig = rig_in(PRE)
     rig.put(0x1802, 1, 2)
-    assert answers_sdo(rig)
-    rig.sync()
-    assert rig.take() == []
-    rig.send(0x200 + NODE_ID, b'\x06\x00')
-    assert rig.get(0x6040) == 0
-
-    rig.nmt(START)
+    for command, sdo, word, tpdos in (
+        (NmtCommand.ENTER_PRE_OPERATIONAL, True, 0, 0),
+        (START, True, 6, 2),  # TPDO 3 and 4
+        (NmtCommand.STOP, False, 6, 0),
+    ):
+        rig.nmt(command)
+        rig.take()
+        assert (rig.raw_sdo(b'\x40\x00\x10\x00\x00\x00\x00\x00') is not None) is sdo
+        rig.sync()
+        assert len(rig.take()) == tpdos
+        rig.send(0x200 + NODE_ID, b'\x06\x00' if sdo else b'\x00\x00')
+        assert rig.device.store.integer(0x6040).value == word
     rig.take()
-    assert answers_sdo(rig)
-    rig.sync()
-    assert len(rig.take(0x380 + NODE_ID)) == 1
-    rig.send(0x200 + NODE_ID, b'\x06\x00')
-    assert rig.get(0x6040) == 6
-
-    rig.nmt(NmtCommand.STOP)
-    rig.take()
-    assert not answers_sdo(rig)
-    rig.sync()
-    rig.send(0x200 + NODE_ID, b'\x00\x00')
     rig.run(1.0)
     assert rig.take() == []
 
 
 @pytest.mark.parametrize(('command', 'velocity'), [(RESETS[0], 1000), (RESETS[1], 77)])
 def test_a_reset_restores_defaults(command: NmtCommand, velocity: int) -> None:
-    """Of the node all objects, of communication 0x1000 to 0x1FFF only."""
+    """Of the node all objects, of communication 0x1000 to 0x1FFF only; nothing else goes on."""
     rig = rig_in(OP)
     rig.put(0x6081, 77)
     rig.put(0x1017, 500)
+    rig.raw_sdo(b'\x40\x08\x10\x00\x00\x00\x00\x00')  # of a transfer
     rig.nmt(command)
-    assert (rig.get(0x6081), rig.get(0x1017)) == (velocity, 0)
-
-
-def test_reset_ends_a_transfer_and_the_heartbeat() -> None:
-    """Nothing of the time before a reset goes on after it."""
-    rig = rig_in(PRE)
-    rig.put(0x1017, 100)
-    rig.raw_sdo(b'\x40\x08\x10\x00\x00\x00\x00\x00')
-    rig.nmt(NmtCommand.RESET_COMMUNICATION)
     rig.take()
     rig.run(5.0)
     assert rig.take() == []
+    assert (rig.get(0x6081), rig.get(0x1017)) == (velocity, 0)
 
 
 def test_device_without_any_object_lives() -> None:
@@ -263,8 +227,7 @@ def test_drive_stops_without_its_master(
     rig.enable(3)
     beat(rig)
     rig.run(1.0)
-    assert rig.state is state
-    assert rig.get(0x603F) == code
+    assert (rig.state, rig.get(0x603F)) == (state, code)
     assert (rig.get(0x606C) == 0) is (option != 0)
 
 
@@ -289,17 +252,11 @@ def test_a_fault_of_a_lost_master_is_latched(rig: Rig, *, back: bool) -> None:
     assert rig.state is DriveState.SWITCH_ON_DISABLED
 
 
-def test_two_watches_of_one_device_are_refused(rig: Rig) -> None:
-    """One device cannot have two consumer times (CiA 301, 7.5.2.17)."""
-    watch(rig, 300)
-    assert rig.refused(0x1016, MASTER << 16 | 500, 2) == AbortCode.PARAMETER_INCOMPATIBLE
-    watch(rig, 500, subindex=1)
-    watch(rig, 500, node_id=2, subindex=2)
-
-
 def test_several_devices_are_watched(rig: Rig) -> None:
-    """The error lasts until the last lost device is back."""
+    """Each once (CiA 301, 7.5.2.17); the error lasts until the last lost device is back."""
     watch(rig, 300, node_id=1, subindex=1)
+    assert rig.refused(0x1016, 1 << 16 | 500, 2) == AbortCode.PARAMETER_INCOMPATIBLE
+    watch(rig, 500, node_id=1, subindex=1)
     watch(rig, 600, node_id=2, subindex=2)
     beat(rig, 1)
     beat(rig, 2)
@@ -333,18 +290,8 @@ def test_other_frames_are_no_heartbeats(rig: Rig, data: bytes) -> None:
 
 def guarded(behaviour: int = 0) -> Rig:
     """Return a drive in Pre-operational with a life time of 0.3 s."""
-    added = (
-        (0x100C, 0, DataType.UNSIGNED16, 100),
-        (0x100D, 0, DataType.UNSIGNED8, 3),
-        (0x1029, 1, DataType.UNSIGNED8, behaviour),
-    )
-    places = [(index, subindex) for index, subindex, *_ in added]
-    entries = [entry for entry in drive_dictionary() if entry.address not in places]
-    entries += [
-        ObjectEntry(index, subindex, 'added', kind, default=value)
-        for index, subindex, kind, value in added
-    ]
-    return Rig(ObjectDictionary(entries))
+    defaults = {(0x100C, 0): 100, (0x100D, 0): 3, (0x1029, 1): behaviour}
+    return Rig(with_defaults(drive_dictionary(), defaults))
 
 
 def guard(rig: Rig) -> list[int]:

@@ -18,7 +18,8 @@ from typing import Any
 
 from can_addresses import free_multicast, free_virtual
 from config_samples import ARTICLE_BUS
-from device_rig import drive_dictionary, EDS
+from device_rig import EDS
+from drive_samples import drive_dictionary
 from isolation import Isolation
 import pytest
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from device_rig import drive_dictionary, NODE_ID, Rig, with_defaults
+from device_rig import NODE_ID, Rig
+from drive_samples import drive_dictionary, with_defaults
 import pytest
 
 from canopen_core.can import Frame

@@ -22,8 +22,8 @@ import can
 from can_addresses import free_virtual
 import canopen
 from canopen.profiles.p402 import BaseNode402
-from device_rig import drive_dictionary, EDS, NODE_ID, Rig
-from drive_samples import bus_config, drive_config, DRIVE_EDS
+from device_rig import EDS, NODE_ID, Rig
+from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
 
 from canopen_core.can import Frame, open_bus

@@ -8,7 +8,8 @@ from binascii import crc_hqx
 from dataclasses import replace
 import struct
 
-from device_rig import drive_dictionary, NODE_ID, Rig
+from device_rig import NODE_ID, Rig
+from drive_samples import drive_dictionary
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -4,17 +4,8 @@
 
 from __future__ import annotations
 
-from device_rig import (
-    DISABLE_VOLTAGE,
-    drive_dictionary,
-    ENABLE,
-    FAULT_RESET,
-    QUICK_STOP,
-    Rig,
-    SHUTDOWN,
-    SWITCH_ON,
-    with_defaults,
-)
+from device_rig import DISABLE_VOLTAGE, ENABLE, FAULT_RESET, QUICK_STOP, Rig, SHUTDOWN, SWITCH_ON
+from drive_samples import drive_dictionary, with_defaults
 import pytest
 
 from arm_canopen import DriveState as State

@@ -280,12 +280,7 @@ def test_the_heartbeat_of_a_dcf_counts(tmp_path: Path) -> None:
 def test_a_pdo_of_a_dcf_is_configured(tmp_path: Path) -> None:
     """The device has its transmission type, time and mapping after the boot."""
     (plain,) = load(tmp_path, {}).nodes
-    changes = {
-        '1800sub2': '1',
-        '1800sub3': '50',
-        '1A00sub0': '1',
-        '1A00sub1': '0x60410010',
-    }
+    changes = {'1800sub2': '1', '1800sub3': '50', '1A00sub0': '1', '1A00sub1': '0x60410010'}
     (node,) = load(tmp_path, changes).nodes
     pdo = node.tpdos[0]
     assert (pdo.configured, pdo.transmission, pdo.inhibit_time) == (True, 1, 0.005)
