@@ -52,44 +52,48 @@ def homing_rig(method: int, start: int = 0) -> Rig:
 
 @pytest.mark.parametrize('method', HOMES)
 def test_method_finds_its_home(method: int) -> None:
-    """From either side of the home switch and from on it, each method finds the same place."""
-    for start in (-900, 0, 600, 900):
+    """From either side of the home switch and from on it, each method finds the same place.
+
+    Also where a search is so fast that it cannot stop on the switch.
+    """
+    for start, speed in ((-900, 1000), (0, 1000), (600, 1000), (900, 1000), (100, 6000)):
         rig = homing_rig(method, start)
         rig.put(0x607C, 40)
+        rig.put(0x6099, speed, 1)
+        rig.put(0x609A, 30_000 if speed > 1000 else 20_000)
         rig.command(ENABLE | START)
         rig.run(0.01)
         assert not rig.statusword & (ATTAINED | ERROR)
         rig.run(20.0)
         assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ATTAINED
-        assert rig.drive.origin == pytest.approx(40 - HOMES[method]), start
+        assert rig.drive.origin == pytest.approx(40 - HOMES[method]), (start, speed)
 
 
-@pytest.mark.parametrize('method', HOMES)
-def test_search_that_runs_over_the_switch_comes_back(method: int) -> None:
-    """A search so fast that it cannot stop on the home switch finds the same place."""
-    rig = homing_rig(method, 100)
-    rig.put(0x6099, 6000, 1)
-    rig.put(0x609A, 30_000)
+@pytest.mark.parametrize(
+    ('method', 'start', 'home'),
+    [(33, 400, 130), (34, 400, 1130), (33, -1100, None), (34, 1600, None)],
+)
+def test_index_methods_take_the_next_pulse(method: int, start: int, home: int | None) -> None:
+    """Without any switch; beyond an active limit switch the search ends at once."""
+    rig = homing_rig(method, start)
     rig.command(ENABLE | START)
-    rig.run(20.0)
-    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ATTAINED
-    assert rig.drive.origin == pytest.approx(-HOMES[method])
+    rig.run(1.0 if home is None else 20.0)
+    if home is None:
+        assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
+        assert rig.position == pytest.approx(start, abs=5.0)
+    else:
+        assert rig.statusword & ATTAINED
+        assert rig.drive.origin == pytest.approx(-home)
 
 
-@pytest.mark.parametrize(('method', 'home'), [(33, 130), (34, 1130)])
-def test_index_methods_take_the_next_pulse(method: int, home: int) -> None:
-    """Methods 33 and 34 need no switch."""
-    rig = homing_rig(method, 400)
-    rig.command(ENABLE | START)
-    rig.run(20.0)
-    assert rig.statusword & ATTAINED
-    assert rig.drive.origin == pytest.approx(-home)
-
-
-@pytest.mark.parametrize('method', [15, 31, 36, 127, -1, -128])
-def test_method_that_is_not_there_is_an_error(method: int) -> None:
-    """Not a fault, and it moves nothing; selecting the mode again clears it."""
+@pytest.mark.parametrize(
+    ('method', 'speed'),
+    [(15, 1000), (31, 1000), (36, 1000), (127, 1000), (-1, 1000), (-128, 1000), (17, 0)],
+)
+def test_method_that_is_not_there_is_an_error(method: int, speed: int) -> None:
+    """Nor one without speed; no fault, and nothing moves; selecting the mode again clears it."""
     rig = homing_rig(method)
+    rig.put(0x6099, speed, 1)
     rig.command(ENABLE | START)
     rig.run(0.5)
     assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
@@ -136,25 +140,6 @@ def test_without_a_home_switch_both_limits_end_the_search() -> None:
     assert abs(rig.velocity) < 0.1
 
 
-@pytest.mark.parametrize(('method', 'start'), [(33, -1100), (34, 1600)])
-def test_a_pulse_beyond_a_limit_switch_is_not_found(method: int, start: int) -> None:
-    """Where the limit switch ahead is active at the start, the search ends at once."""
-    rig = homing_rig(method, start)
-    rig.command(ENABLE | START)
-    rig.run(1.0)
-    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
-    assert rig.position == pytest.approx(start, abs=5.0)
-
-
-def test_speed_of_zero_is_an_error() -> None:
-    """A search that cannot move is none."""
-    rig = homing_rig(17)
-    rig.put(0x6099, 0, 1)
-    rig.command(ENABLE | START)
-    rig.run(0.1)
-    assert rig.statusword & ERROR
-
-
 @pytest.mark.parametrize('word', [ENABLE, ENABLE | START | HALT], ids=['bit taken back', 'halt'])
 def test_an_interrupted_search_stops_and_goes_on(word: int) -> None:
     """The axis stops, neither homed nor in error, until the start bit counts again."""
@@ -188,9 +173,8 @@ def test_search_keeps_to_its_speeds(method: int, start: int) -> None:
 
 def test_switches_show_as_digital_inputs() -> None:
     """0x60FD has the limit switches, the home switch and the interlock."""
-    assert homing_rig(0, 600).get(0x60FD) == 0x4
-    assert homing_rig(0, -1100).get(0x60FD) == 0x1
-    rig = homing_rig(0, 1600)
-    assert rig.get(0x60FD) == 0x2
+    for start, inputs in ((600, 0x4), (-1100, 0x1), (1600, 0x2)):
+        rig = homing_rig(0, start)
+        assert rig.get(0x60FD) == inputs
     rig.drive.set_voltage(False, rig.now)
     assert rig.get(0x60FD) == 0xA
