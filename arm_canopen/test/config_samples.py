@@ -42,6 +42,17 @@ nodes:
     node_id: 2
 """
 """A bus without errors and warnings; its last section is that of a device."""
+FLAT_BUS = """options: {dcf_path: "@BUS_CONFIG_PATH@"}
+master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}
+.template: {this: is ignored}
+joint1:
+  node_id: 2
+  dcf: drive.eds
+  driver: "ros2_canopen::Cia402Driver"
+  tpdo: {1: {mapping: [{index: 0x6041}]}}
+  rpdo: {1: {mapping: [{index: 0x6040}]}}
+"""
+"""The same in dcfgen's own, flat format."""
 
 
 def added(section: str, piece: str, base: str = BUS) -> str:

@@ -10,7 +10,7 @@ import re
 import shutil
 from typing import NamedTuple
 
-from config_samples import added, BUS, load_text, TWO_AXES_EDS, write_bus
+from config_samples import added, BUS, FLAT_BUS, load_text, TWO_AXES_EDS, write_bus
 from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 
@@ -39,17 +39,7 @@ RICH_EDS = eds_text(
     [row for row in DRIVE_ROWS if row.subindex or row.index != 0x1016]
     + [Row(0x1016, 0, 'Highest sub-index', 5, 'const', '2'), *MORE_ROWS]
 )
-CLEAN = """\
-master:
-  node_id: 1
-  driver: "ros2_canopen::MasterDriver"
-  package: "canopen_master_driver"
-  sync_period: 10000
-
-defaults:
-  dcf: drive.eds
-  driver: "ros2_canopen::Cia402Driver"
-  package: "canopen_402_driver"
+DEVICES = """\
   heartbeat_producer: 100
   position_mode: 8
   sdo:
@@ -66,6 +56,7 @@ nodes:
   joint1:
     node_id: 2
 """
+CLEAN = BUS.partition('  tpdo:')[0] + DEVICES
 """A bus with nothing to report, also with the EDS of more objects."""
 
 
@@ -349,17 +340,6 @@ def test_what_requests_nothing_is_no_warning(tmp_path: Path, piece: str) -> None
 
 
 NODES_LIST = BUS.replace('nodes:\n  joint1:\n    node_id: 2', 'nodes:\n  - joint1: {node_id: 2}')
-OLD = """options: {dcf_path: "@BUS_CONFIG_PATH@"}
-master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}
-.template: {this: is ignored}
-joint1:
-  node_id: 2
-  dcf: drive.eds
-  driver: "ros2_canopen::Cia402Driver"
-  tpdo: {1: {mapping: [{index: 0x6041}]}}
-  rpdo: {1: {mapping: [{index: 0x6040}]}}
-"""
-"""The sample in dcfgen's own, flat format."""
 PROXY = BUS.replace('Cia402Driver', 'ProxyDriver').replace('402_driver', 'proxy_driver')
 LAYOUTS = [
     (NODES_LIST, 20, "'nodes' is a list"),
@@ -367,10 +347,11 @@ LAYOUTS = [
     (BUS.partition('  joint1:')[0], 20, 'there are no devices'),
     (BUS.partition('    node_id: 2')[0], 21, 'a device with its keys, got nothing'),
     (BUS.replace('nodes:', 'node:'), 20, "mean 'nodes'"),
-    (OLD.partition('joint1')[0], 0, 'there are no devices'),
-    (OLD.replace('master:', 'mastr:'), 2, "mean 'master'"),
-    (OLD.replace('master:', 'mastr:'), 0, "no section 'master'"),
-    (OLD.replace('  node_id: 2\n', ''), 4, "no 'node_id'"),
+    (FLAT_BUS.partition('joint1')[0], 0, 'there are no devices'),
+    (FLAT_BUS.replace('master:', 'mastr:'), 2, "mean 'master'"),
+    (FLAT_BUS.replace('master:', 'mastr:'), 0, "no section 'master'"),
+    (FLAT_BUS.replace('master:', 'mastr:'), 0, "no 'driver'"),
+    (FLAT_BUS.replace('  node_id: 2\n', ''), 4, "no 'node_id'"),
     (BUS.replace('  node_id: 1\n', ''), 1, "no 'node_id'"),
     (BUS.replace('joint1', 'joint-1'), 21, "'joint-1' is no name"),
     (added('nodes', 'joint2: {node_id: 2}'), 23, 'is also that of joint1 .line 22'),
@@ -562,32 +543,29 @@ def test_a_drive_without_eds_is_a_drive_of_the_standard(tmp_path: Path) -> None:
     assert all(pdo.configured for pdo in (*node.tpdos, *node.rpdos) if pdo.enabled)
 
 
-def test_a_fixed_mapping_is_kept(tmp_path: Path) -> None:
-    """A device whose mapping is read-only is used with it, and marked so."""
-    (node,) = load_text(tmp_path, eds=fixed_tpdos()).nodes
-    assert [pdo.fixed_mapping for pdo in node.tpdos] == [True] * 6
-    assert {mapped.word for pdo in node.tpdos for mapped in pdo.mapping} == {0x6041_0010}
+@pytest.mark.parametrize(
+    ('eds', 'words', 'fixed'),
+    [
+        (fixed_tpdos(), [0x6041_0010], True),  # read-only: used as it is, and marked so
+        (with_default_mapping('0x70000020'), [0x7000_0020], False),  # unknown: by its length
+        # bit 7 of a length belongs to the vendor
+        (with_default_mapping('0x60410090', '0x606400A0'), [0x6041_0010, 0x6064_0020], False),
+    ],
+)
+def test_odd_mappings_of_an_eds_are_taken_as_far_as_they_are_understood(
+    tmp_path: Path, eds: str, words: list[int], fixed: bool
+) -> None:
+    """So that the device is read as it sends."""
+    (node,) = load_text(tmp_path, eds=eds).nodes
+    assert [mapped.word for mapped in node.tpdos[1].mapping] == words
+    assert [pdo.fixed_mapping for pdo in node.tpdos] == [fixed] * 6
 
 
-def test_odd_mappings_of_an_eds_are_taken_as_far_as_they_are_understood(tmp_path: Path) -> None:
-    """An unknown object by its length; bit 7 of a length belongs to the vendor."""
-    for words, taken in (
-        (['0x70000020'], [0x7000_0020]),
-        (['0x60410090', '0x606400A0'], [0x6041_0010, 0x6064_0020]),
-    ):
-        (node,) = load_text(tmp_path, eds=with_default_mapping(*words)).nodes
-        assert [mapped.word for mapped in node.tpdos[1].mapping] == taken
-
-
-def test_a_cyclic_mode_needs_sync(tmp_path: Path) -> None:
-    """And so does a synchronous PDO."""
+def test_sync_that_is_missing(tmp_path: Path) -> None:
+    """A cyclic mode and a synchronous PDO need it, a start value one of a counter."""
     found = report_of(tmp_path, added('joint1', 'effort_mode: 10', NO_SYNC)).warnings
     assert listed(found, 'mode 10 .* needs SYNC')
     assert listed(found, 'TPDO 1 of joint1 waits for SYNC')
-
-
-def test_a_start_value_above_the_counter_never_comes(tmp_path: Path) -> None:
-    """Of the SYNC counter that the master has."""
     text = added('master', 'sync_overflow: 10', CLEAN)
     text = added('joint1', TPDO_2.format('sync_start: 20'), text)
     (error,) = report_of(tmp_path, text).errors
@@ -617,30 +595,24 @@ def test_load(tmp_path: Path, bitrate: int, kind: str | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ('keys', 'reason', 'rate'),
+    ('keys', 'service', 'reason', 'rate'),
     [
-        ('event_timer: 50', 'on change, taken as every 10 ms', 100),
-        ('inhibit_time: 400', 'taken as every 40 ms', 25),
-        ('event_timer: 10', 'event timer 10 ms', 100),
-        ('transmission: 5', 'every 5th SYNC', 20),
-        ('transmission: 0', 'with SYNC on change', 100),
+        (TPDO_2.format('event_timer: 50'), 'TPDO 2', 'on change, taken as every 10 ms', 100),
+        (TPDO_2.format('inhibit_time: 400'), 'TPDO 2', 'taken as every 40 ms', 25),
+        (TPDO_2.format('event_timer: 10'), 'TPDO 2', 'event timer 10 ms', 100),
+        (TPDO_2.format('transmission: 5'), 'TPDO 2', 'every 5th SYNC', 20),
+        (TPDO_2.format('transmission: 0'), 'TPDO 2', 'with SYNC on change', 100),
+        ('heartbeat_producer: 0\nguard_time: 200', 'guarding', '', 5),
     ],
 )
-def test_rates(tmp_path: Path, keys: str, reason: str, rate: float) -> None:
-    """Each kind of TPDO has its rate, and the reason is reported."""
-    report = report_of(tmp_path, added('joint1', TPDO_2.format(keys), CLEAN))
+def test_rates(tmp_path: Path, keys: str, service: str, reason: str, rate: float) -> None:
+    """Each kind of TPDO has its rate, and the reason is reported; guarding is sent both ways."""
+    report = report_of(tmp_path, added('joint1', keys, CLEAN))
     assert report.load is not None
-    (item,) = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', 'TPDO 2')]
-    assert item.rate == pytest.approx(rate)
-    assert reason in item.reason
-
-
-def test_guarding_is_in_the_load(tmp_path: Path) -> None:
-    """Question and answer."""
-    report = report_of(tmp_path, added('joint1', 'heartbeat_producer: 0\nguard_time: 200', CLEAN))
-    assert report.load is not None
-    frames = [t for t in report.load.traffic if t.service == 'guarding']
-    assert [(t.device, t.size, t.rate) for t in frames] == [('joint1', 0, 5), ('joint1', 1, 5)]
+    found = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', service)]
+    assert [item.rate for item in found] == pytest.approx([rate] * len(found))
+    assert reason in found[0].reason
+    assert [t.size for t in found] == ([0, 1] if service == 'guarding' else [4])
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,14 @@ from __future__ import annotations
 from operator import attrgetter
 from pathlib import Path
 import shutil
+from unittest.mock import Mock
 
-from config_samples import added, ARTICLE_BUS, BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
+from config_samples import added, ARTICLE_BUS, BUS, FLAT_BUS, load_text, TWO_AXES_EDS, write_bus
 from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 
 from arm_canopen import BusConfig, DriveState, load_bus, NodeConfig
-from arm_canopen.config import DEFAULT_DRIVE, Identity, PdoConfig, RecoveryPolicy, SdoWrite
+from arm_canopen.config import DEFAULT_DRIVE, Identity, RecoveryPolicy, SdoWrite
 from canopen_core.eds import load_eds
 from canopen_core.standard import CAN_ID_MASK, DataType
 
@@ -21,46 +22,37 @@ DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 
 
 @pytest.mark.parametrize(
-    ('piece', 'attribute', 'value'),
+    ('section', 'piece', 'attribute', 'value'),
     [
-        ('remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
-        ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
-        ('heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
-        ('heartbeat_producer: 50\nheartbeat_multiplier: 2', 'heartbeat_timeout', 0.1),
-        ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
-        ('heartbeat_consumer: false', 'heartbeat_consumer', False),
-        ('revision_number: 0x10002', 'identity.revision_number', 0x10002),
-        ('scale_eff_to_dev: 8', 'drive.scale_eff_from_dev', 0.125),
-        ('switching_state: 2', 'drive.switching_state', DriveState.SWITCH_ON_DISABLED),
-        ('switching_state: 8', 'drive.switching_state', DriveState.OPERATION_ENABLED),
-        ('recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
+        ('joint1', 'remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
+        ('joint1', 'sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
+        ('joint1', 'heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
+        ('joint1', 'heartbeat_producer: 50\nheartbeat_multiplier: 2', 'heartbeat_timeout', 0.1),
+        ('joint1', 'heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
+        ('joint1', 'period: 5', 'heartbeat_consumer', True),  # it has 0x1016
+        ('joint1', 'heartbeat_consumer: false', 'heartbeat_consumer', False),
+        ('joint1', 'period: 5', 'identity', Identity(0x0002_0192, 0x555, 7)),  # of the EDS
+        ('joint1', 'revision_number: 0x10002', 'identity.revision_number', 0x10002),
+        ('joint1', 'scale_eff_to_dev: 8', 'drive.scale_eff_from_dev', 0.125),
+        ('joint1', 'switching_state: 2', 'drive.switching_state', DriveState.SWITCH_ON_DISABLED),
+        ('joint1', 'switching_state: 8', 'drive.switching_state', DriveState.OPERATION_ENABLED),
+        ('joint1', 'recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
+        ('master', 'remappings: {a: b}', 'remappings', {'a': 'b'}),
+        ('master', 'baudrate: 125', 'bitrate', 125_000),
+        ('master', 'nmt_inhibit_time: 50', 'nmt_inhibit_time', 0.005),
+        ('master', 'time_cob_id: 0x40000100', 'time_period', 1.0),
+        ('master', 'time_cob_id: 0x80000100', 'time_period', 0.0),
+        ('master', 'time_period_ms: 500', 'time_period', 0.5),
+        ('master', 'time_period_ms: 500', 'time_cob_id', 0x40000100),
+        ('master', 'sync_period: 5000', 'cycle_period', 0.005),
+        ('master', 'heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
+        ('master', 'heartbeat_producer: 100\nheartbeat_multiplier: 5', 'heartbeat_timeout', 0.5),
     ],
 )
-def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
+def test_keys(tmp_path: Path, section: str, piece: str, attribute: str, value: object) -> None:
     """Each key fills its attribute, times in seconds."""
-    (node,) = load_text(tmp_path, added('joint1', piece)).nodes
-    assert attrgetter(attribute)(node) == value
-
-
-@pytest.mark.parametrize(
-    ('piece', 'attribute', 'value'),
-    [
-        ('remappings: {a: b}', 'remappings', {'a': 'b'}),
-        ('baudrate: 125', 'bitrate', 125_000),
-        ('nmt_inhibit_time: 50', 'nmt_inhibit_time', 0.005),
-        ('time_cob_id: 0x40000100', 'time_period', 1.0),
-        ('time_cob_id: 0x80000100', 'time_period', 0.0),
-        ('time_period_ms: 500', 'time_period', 0.5),
-        ('time_period_ms: 500', 'time_cob_id', 0x40000100),
-        ('sync_period: 5000', 'cycle_period', 0.005),
-        ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
-        ('heartbeat_producer: 100\nheartbeat_multiplier: 5', 'heartbeat_timeout', 0.5),
-    ],
-)
-def test_keys_of_the_master(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
-    """Each key fills its attribute, times in seconds."""
-    master = load_text(tmp_path, added('master', piece)).master
-    assert attrgetter(attribute)(master) == value
+    bus = load_text(tmp_path, added(section, piece))
+    assert attrgetter(attribute)(bus.master if section == 'master' else bus.nodes[0]) == value
 
 
 def test_supervision_of_heartbeats(tmp_path: Path) -> None:
@@ -74,37 +66,17 @@ def test_supervision_of_heartbeats(tmp_path: Path) -> None:
     name = 'Producer heartbeat time\nDataType=0x0006\nAccessType=rw\nDefaultValue='
     (node,) = load_text(tmp_path, eds=eds_text().replace(f'{name}0', f'{name}250')).nodes
     assert (node.heartbeat_producer, node.heartbeat_timeout) == (0.25, 0.75)  # that of the EDS
-
-
-def test_devices_watch_the_master_where_they_can(tmp_path: Path) -> None:
-    """By default a device with 0x1016 watches, one without does not, none without a heartbeat."""
-    assert load_text(tmp_path).nodes[0].heartbeat_consumer
+    # a device without 0x1016 does not watch the master, nor does any one that sends no heartbeat
     without = eds_text().replace('[1016', '[2F16')
     assert not load_text(tmp_path, eds=without).nodes[0].heartbeat_consumer
     silent = added('master', 'heartbeat_producer: 0')
     assert not load_text(tmp_path, silent).nodes[0].heartbeat_consumer
-
-
-@pytest.mark.parametrize(
-    ('piece', 'guard_time'),
-    [
-        ('heartbeat_producer: 0\nguard_time: 150', 0.15),
-        ('heartbeat_producer: 0', 0.05),
-        ('heartbeat_producer: 100\nguard_time: 150', 0.0),
-    ],
-)
-def test_a_device_without_heartbeat_is_guarded(
-    tmp_path: Path, piece: str, guard_time: float
-) -> None:
-    """bus.yml says how often, else the EDS does; both at a time are forbidden by CiA 301."""
+    # bus.yml says how often a device without heartbeat is guarded, else the EDS does
     eds = eds_text([*DRIVE_ROWS, Row(0x100C, 0, 'Guard time', 6, 'rw', '50')])
-    (node,) = load_text(tmp_path, added('joint1', piece), eds=eds).nodes
-    assert (node.guard_time, node.uses_node_guarding) == (guard_time, guard_time > 0.0)
-
-
-def test_the_identity_is_that_of_the_eds(tmp_path: Path) -> None:
-    """Type, vendor and product are checked; revision and serial only if bus.yml names them."""
-    assert load_text(tmp_path).nodes[0].identity == Identity(0x0002_0192, 0x555, 7)
+    for producer, own, guard_time in ((0, 150, 0.15), (0, None, 0.05), (100, 150, 0.0)):
+        keys = f'heartbeat_producer: {producer}' + (f'\nguard_time: {own}' if own else '')
+        (node,) = load_text(tmp_path, added('joint1', keys), eds=eds).nodes
+        assert (node.guard_time, node.uses_node_guarding) == (guard_time, guard_time > 0.0)
 
 
 def test_the_node_id_may_come_from_a_dcf(tmp_path: Path) -> None:
@@ -202,33 +174,16 @@ def test_free_identifiers_are_given_to_pdos_from_the_fifth_on(tmp_path: Path) ->
 
 def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Seven devices that share an EDS cost one reading."""
-    reads: list[Path] = []
-
-    def counted(path: Path) -> object:
-        reads.append(path)
-        return load_eds(path)
-
-    monkeypatch.setattr('arm_canopen.config.read.document.load_eds', counted)
+    reading = Mock(wraps=load_eds)
+    monkeypatch.setattr('arm_canopen.config.read.document.load_eds', reading)
     text = BUS + ''.join(f'  joint{n}: {{node_id: {n + 1}}}\n' for n in range(2, 8))
     assert len(load_text(tmp_path, text).nodes) == 7
-    assert len(reads) == 1
-
-
-OLD = """options: {dcf_path: "@BUS_CONFIG_PATH@"}
-master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}
-.template: {this: is ignored}
-joint1:
-  node_id: 2
-  dcf: drive.eds
-  driver: "ros2_canopen::Cia402Driver"
-  tpdo: {1: {mapping: [{index: 0x6041}]}}
-  rpdo: {1: {mapping: [{index: 0x6040}]}}
-"""
+    assert reading.call_count == 1
 
 
 def test_both_formats_give_the_same_device(tmp_path: Path) -> None:
     """A device is the same in the old flat format and in the new one, but for its line."""
-    (old,) = load_text(tmp_path, OLD).nodes
+    (old,) = load_text(tmp_path, FLAT_BUS).nodes
     (new,) = load_text(tmp_path).nodes
     names = NodeConfig.__dataclass_fields__.keys() - {'line', 'dictionary'}
     assert [getattr(old, name) for name in names] == [getattr(new, name) for name in names]
@@ -324,13 +279,6 @@ def test_another_folder_for_the_variable(tmp_path: Path) -> None:
     assert load_bus(path, bus_config_path=other).nodes[0].eds == other / 'drive.eds'
 
 
-def test_what_a_missing_section_lacks_has_its_name(tmp_path: Path) -> None:
-    """There is no line to show."""
-    path = write_bus(tmp_path, OLD.replace('master:', 'mastr:'))
-    lacking = {"no 'driver'", "no 'node_id'"}
-    assert {each.key for each in errors_of(path) if each.message in lacking} == {'master'}
-
-
 @pytest.fixture(params=['sample EDS', 'shipped EDS'])
 def article(request: pytest.FixtureRequest, tmp_path: Path) -> BusConfig:
     """Load the published bus.yml of a seven-joint arm, unchanged."""
@@ -342,54 +290,43 @@ def article(request: pytest.FixtureRequest, tmp_path: Path) -> BusConfig:
 
 
 def test_the_article_loads_without_a_warning(article: BusConfig) -> None:
-    """The master sends a heartbeat, so that drives notice its end; devices are found by name."""
+    """The master sends a heartbeat, so that drives notice its end; the joints are alike."""
     master = article.master
     assert article.warnings == ()
     assert (master.node_id, master.name, master.bitrate) == (1, 'master', 1_000_000)
-    assert master.sync_period == master.cycle_period == 0.01
-    assert master.heartbeat_producer == 0.2
-    assert master.heartbeat_timeout == pytest.approx(0.6)
+    assert (master.sync_period, master.cycle_period) == (0.01, 0.01)
+    assert (master.heartbeat_producer, master.heartbeat_timeout) == pytest.approx((0.2, 0.6))
     assert master.start_nodes
     assert article.node('panda_joint3').node_id == 4
     with pytest.raises(KeyError, match='panda_joint1, panda_joint2'):
         article.node('panda_joint8')
-
-
-def _summary(pdo: PdoConfig) -> tuple[int, int, int, list[int]]:
-    return pdo.number, pdo.cob_id, pdo.transmission, [mapped.index for mapped in pdo.mapping]
-
-
-def test_the_joints_of_the_article(article: BusConfig) -> None:
-    """In the order of the file, alike but for name, node id and COB-IDs."""
-    assert [(node.name, node.node_id) for node in article.nodes] == [
-        (f'panda_joint{number}', number + 1) for number in range(1, 8)
-    ]
-    for node in article.nodes:
-        own, drive = node.node_id, node.drive
-        assert node.is_drive
+    for number, node in enumerate(article.nodes, start=1):
+        own, drive, identity = number + 1, node.drive, node.identity
+        assert (node.name, node.node_id, node.is_drive) == (f'panda_joint{number}', own, True)
         assert node.heartbeat_consumer
         assert (node.heartbeat_producer, node.heartbeat_timeout) == (1.0, 3.0)
         assert (drive.position_mode, drive.velocity_mode) == (1, None)
         assert drive.switching_state is DriveState.OPERATION_ENABLED
-        assert node.identity.device_type != 0
-        assert node.identity.revision_number == node.identity.serial_number == 0
-        assert [_summary(pdo) for pdo in node.tpdos if pdo.enabled] == [
-            (1, 0x180 + own, 1, [0x6041, 0x6061]),
-            (2, 0x280 + own, 1, [0x6064, 0x606C]),
-        ]
-        assert [_summary(pdo) for pdo in node.rpdos if pdo.enabled] == [
-            (1, 0x200 + own, 255, [0x6040, 0x6060]),
-            (2, 0x300 + own, 255, [0x607A, 0x60FF]),
+        assert identity.device_type != 0 == identity.revision_number == identity.serial_number
+        pdos = [pdo for pdo in node.tpdos + node.rpdos if pdo.enabled]
+        assert [
+            (pdo.number, pdo.cob_id - own, pdo.transmission, [each.index for each in pdo.mapping])
+            for pdo in pdos
+        ] == [
+            (1, 0x180, 1, [0x6041, 0x6061]),
+            (2, 0x280, 1, [0x6064, 0x606C]),
+            (1, 0x200, 255, [0x6040, 0x6060]),
+            (2, 0x300, 255, [0x607A, 0x60FF]),
         ]
         assert [pdo.configured for pdo in node.tpdos[:4] + node.rpdos[:4]] == [True] * 8
         entry = node.dictionary.get(0x1800, 1)  # ``$NODEID``, although they share one file
         assert entry is not None
         assert int(entry.default or 0) & CAN_ID_MASK == 0x180 + own
     assert article.nodes[0].sdo_writes == (
-        SdoWrite(0x6081, 0, (1000).to_bytes(4, 'little')),
-        SdoWrite(0x6083, 0, (10000).to_bytes(4, 'little')),
-        SdoWrite(0x6084, 0, (10000).to_bytes(4, 'little')),
-        SdoWrite(0x6085, 0, (10000).to_bytes(4, 'little')),
+        *(
+            SdoWrite(index, 0, value.to_bytes(4, 'little'))
+            for index, value in ((0x6081, 1000), *((0x6083 + n, 10000) for n in range(3)))
+        ),
         SdoWrite(0x6098, 0, b'\x00'),
         SdoWrite(0x60C2, 1, b'\x32'),
         SdoWrite(0x60C2, 2, b'\xfd'),
@@ -398,18 +335,12 @@ def test_the_joints_of_the_article(article: BusConfig) -> None:
 
 def test_the_default_dictionary_knows_what_every_drive_has() -> None:
     """The objects of CiA 402 as the simulated drive has them, without what only a device knows."""
-    general, drive = (load_eds(path).dictionary for path in (DEFAULT_DRIVE, DRIVE_EDS))
-    of_profile = {entry.address for entry in drive if 0x6000 <= entry.index < 0x7000}
-    assert of_profile == {entry.address for entry in general if entry.index >= 0x6000}
-    for address in of_profile:
-        known, own = general.get(*address), drive.get(*address)
-        assert known is not None
-        assert own is not None
-        assert (known.name, known.data_type, known.access, known.pdo_mappable) == (
-            own.name,
-            own.data_type,
-            own.access,
-            own.pdo_mappable,
-        )
-        assert known.low_limit is known.high_limit is None
-    assert not any(general.number(0x1018, subindex) for subindex in (1, 2, 3, 4))
+    general, own = (
+        {entry.address: entry for entry in load_eds(path).dictionary}
+        for path in (DEFAULT_DRIVE, DRIVE_EDS)
+    )
+    same = attrgetter('name', 'data_type', 'access', 'pdo_mappable')
+    profile = {address: same(each) for address, each in general.items() if address[0] >= 0x6000}
+    assert profile == {a: same(each) for a, each in own.items() if 0x6000 <= a[0] < 0x7000}
+    assert all(general[each].low_limit is general[each].high_limit is None for each in profile)
+    assert not any(general[0x1018, subindex].default for subindex in (1, 2, 3, 4))

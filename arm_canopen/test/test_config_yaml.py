@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 import random
 import runpy
@@ -61,7 +62,7 @@ EDS = eds_text((*DRIVE_ROWS, *GUARDING))
 
 def bus_with(section: str = '', **keys: Any) -> dict[str, Any]:
     """Return a bus of one drive, with keys in one of its sections."""
-    sections: dict[str, dict[str, Any]] = {
+    parts: dict[str, dict[str, Any]] = {
         'options': {},
         'master': {'node_id': 1, 'driver': 'ros2_canopen::MasterDriver'},
         'device': {'node_id': 2, 'driver': 'ros2_canopen::Cia402Driver', 'dcf': 'drive.eds'},
@@ -70,28 +71,21 @@ def bus_with(section: str = '', **keys: Any) -> dict[str, Any]:
         'sdo': {'index': 0x6081, 'value': 5},
     }
     if section:
-        sections[section] |= keys
-    device = sections['device'] | {
-        'tpdo': {1: sections['tpdo']},
-        'rpdo': {1: sections['rpdo']},
-        'sdo': [sections['sdo']],
+        parts[section] |= keys
+    device = parts['device'] | {
+        'tpdo': {1: parts['tpdo']},
+        'rpdo': {1: parts['rpdo']},
+        'sdo': [parts['sdo']],
     }
-    return {
-        'options': sections['options'],
-        'master': sections['master'],
-        'nodes': {'joint1': device},
-    }
+    return {key: parts[key] for key in ('options', 'master')} | {'nodes': {'joint1': device}}
 
 
 def load(folder: Path, bus: dict[str, Any]) -> BusConfig:
     """Load a bus, without what depends on where it was read from."""
     config = load_text(folder, yaml.safe_dump(bus, sort_keys=False), eds=EDS)
     (node,) = config.nodes
-    plain = replace(node, dictionary=EMPTY, line=0)
-    return replace(config, nodes=(plain,), warnings=())
-
-
-EMPTY: Any = None  # two dictionaries of one EDS are not equal
+    nothing: Any = None  # two dictionaries of one EDS are not equal
+    return replace(config, nodes=(replace(node, dictionary=nothing, line=0),), warnings=())
 
 
 def test_the_page_is_made_of_the_tables() -> None:
@@ -156,30 +150,25 @@ def test_a_key_counts_or_is_said_to_be_ignored(tmp_path: Path, section: str, key
 
 
 @pytest.mark.parametrize(
-    'text',
-    ['0x10', '16', '"16"', "'0x10'", '0b10000', '1_6', '+16', '16.0', '1.6e1', '1e1', '007'],
+    ('key', 'texts', 'value'),
+    [
+        ('node_id', '0x10 16 "16" \'0x10\' 0b10000 1_6 +16 16.0 1.6e1', 16),
+        ('node_id', '1e1', 10),
+        ('node_id', '007', 7),
+        ('drive.offset_pos_to_dev', '1e-5', 1e-5),  # text in YAML 1.1, as it has no point
+        ('drive.offset_pos_to_dev', '"2.5" 2.5', 2.5),
+        ('drive.offset_pos_to_dev', '.5', 0.5),
+        ('drive.offset_pos_to_dev', '-3', -3.0),
+        ('drive.offset_pos_to_dev', '0x10', 16.0),
+        ('mandatory', 'true yes on True 1 Y', True),  # as dcfgen takes them
+        ('mandatory', 'false no off False 0 N', False),
+    ],
 )
-def test_notations_of_whole_numbers(tmp_path: Path, text: str) -> None:
-    """All notations without doubt are taken: 16, or 10 of 1e1, or 7 of 007."""
-    expected = {'1e1': 10, '007': 7}.get(text, 16)
-    bus = load_text(tmp_path, added('joint1', f'node_id: {text}'))
-    assert bus.nodes[0].node_id == expected
-
-
-@pytest.mark.parametrize(
-    ('text', 'value'), [('1e-5', 1e-5), ('"2.5"', 2.5), ('.5', 0.5), ('-3', -3.0), ('0x10', 16.0)]
-)
-def test_notations_of_numbers(tmp_path: Path, text: str, value: float) -> None:
-    """A number may lack its point, although YAML 1.1 then takes 1e-5 for text."""
-    bus = load_text(tmp_path, added('joint1', f'offset_pos_to_dev: {text}'))
-    assert bus.nodes[0].drive.offset_pos_to_dev == value
-
-
-@pytest.mark.parametrize('pair', ['true false', 'yes no', 'on off', 'True False', '1 0', 'Y N'])
-def test_notations_of_booleans(tmp_path: Path, pair: str) -> None:
-    """The words of YAML 1.1 and 0 and 1, which dcfgen takes for truth values, count."""
-    buses = [load_text(tmp_path, added('joint1', f'mandatory: {word}')) for word in pair.split()]
-    assert [bus.nodes[0].mandatory for bus in buses] == [True, False]
+def test_notations(tmp_path: Path, key: str, texts: str, value: object) -> None:
+    """All notations without doubt are taken."""
+    for text in texts.split():
+        bus = load_text(tmp_path, added('joint1', f'{key.removeprefix("drive.")}: {text}'))
+        assert attrgetter(key)(bus.nodes[0]) == value, text
 
 
 def test_a_device_may_be_called_on(tmp_path: Path) -> None:
@@ -318,7 +307,7 @@ TWO_JOINTS = ARTICLE_BUS.read_text('utf-8').split('  panda_joint3:', maxsplit=1)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize('seed', range(2))
 def test_damaged_buses_are_checked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
@@ -340,7 +329,7 @@ def test_damaged_buses_are_checked(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 def test_damaged_eds_files_are_read_or_refused(tmp_path: Path, seed: int) -> None:
     """By themselves, and as those of a bus."""
     generator = random.Random(seed)
