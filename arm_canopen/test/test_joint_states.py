@@ -245,57 +245,32 @@ def test_one_set_for_each_cycle_in_urdf_order(orders: list[list[str]]) -> None:
         assert [*state.samples.values()] == [sample(cycle + place / 10) for place in range(3)]
 
 
-def test_the_set_leaves_with_the_last_joint() -> None:
-    """Not before, and not at the next cycle."""
-    publisher = Publisher()
-    publisher.settle()
-    publisher.receive('base', 3)
-    publisher.receive('elbow', 3)
-    assert publisher.sets == []
-    publisher.receive('wrist', 3)
-    assert len(publisher.sets) == 1
-
-
-def test_a_joint_that_is_lost_delays_one_cycle_only() -> None:
-    """The next cycle ends the incomplete round; after that nobody waits for the lost one."""
-    publisher = Publisher()
-    publisher.settle()
-    for cycle in (3, 4, 5):
-        publisher.receive('elbow', cycle)
-        publisher.receive('base', cycle)
-    assert [state.stamp // PERIOD_NS for state in publisher.sets] == [3, 4, 5]
-
-
 def test_a_lost_joint_is_left_out_after_a_while_and_named() -> None:
-    """Its last state is repeated for a moment, never for longer; then it counts as silent."""
+    """It delays one cycle only; its last state is repeated for a moment, then it counts as silent.
+
+    From its second cycle on it is waited for again.
+    """
     publisher = Publisher()
     publisher.settle()
     last = 2 + round(STALE_AFTER * 1e9 / PERIOD_NS)
     for cycle in range(3, last + 3):
-        publisher.receive('elbow', cycle)
         publisher.receive('base', cycle)
+        assert len(publisher.sets) == max(0, cycle - 3)  # it leaves with the last joint
+        publisher.receive('elbow', cycle)
+    assert [state.stamp // PERIOD_NS for state in publisher.sets] == list(range(3, last + 3))
     with_wrist = [state.stamp // PERIOD_NS for state in publisher.sets if 'wrist' in state.samples]
     assert max(with_wrist) in (last - 1, last)
     assert [*publisher.sets[-1].samples] == ['elbow', 'base']
-    now = (last + 2) * PERIOD_NS * 1e-9
-    assert publisher.aggregator.silent(now) == ['wrist']
-
-
-def test_a_joint_that_comes_back_takes_part_again() -> None:
-    """From its second cycle on it is waited for."""
-    publisher = Publisher()
-    publisher.settle()
-    for cycle in range(3, 90):
-        publisher.receive('elbow', cycle)
-    for cycle in (90, 91, 92):
+    assert publisher.aggregator.silent((last + 2) * PERIOD_NS * 1e-9) == ['wrist']
+    for cycle in range(last + 3, last + 6):
         for name in NAMES:
             publisher.receive(name, cycle)
     assert [len(state.samples) for state in publisher.sets[-2:]] == [3, 3]
-    assert publisher.aggregator.silent(0.93) == []
+    assert publisher.aggregator.silent((last + 6) * PERIOD_NS * 1e-9) == []
 
 
 def test_joints_that_never_come_are_silent_from_the_start() -> None:
-    """In URDF order, without those that follow others."""
+    """In URDF order, without those that follow others; half a robot is not published at once."""
     publisher = Publisher({'a': None, 'b': Mimic('a'), 'c': None})
     assert publisher.aggregator.silent(0.0) == ['a', 'c']
     waited = round(STALE_AFTER * 1e9 / PERIOD_NS) + 1
@@ -305,15 +280,9 @@ def test_joints_that_never_come_are_silent_from_the_start() -> None:
     publisher.receive('c', waited + 1)
     assert [*publisher.sets[-1].samples] == ['c']
     assert publisher.aggregator.silent(waited * 0.01) == ['a']
-
-
-def test_nobody_sees_half_a_robot_at_the_start() -> None:
-    """The first set that is published has every joint that has a drive."""
     publisher = Publisher()
-    publisher.receive('elbow', 1)
-    publisher.receive('elbow', 2)
-    publisher.receive('wrist', 2)
-    publisher.receive('base', 2)
+    for name, cycle in (('elbow', 1), ('elbow', 2), ('wrist', 2), ('base', 2)):
+        publisher.receive(name, cycle)
     assert [[*state.samples] for state in publisher.sets] == [NAMES]
 
 
@@ -356,52 +325,46 @@ def test_joints_with_one_variable_in_the_order_of_the_urdf() -> None:
 
 
 PERIOD = 2.0  # [s] between two looks
-JOINTS = ['base', 'elbow']
 
 
-def all_there() -> SilenceWatch:
-    """Return the watch of a robot that has started."""
-    watch = SilenceWatch(JOINTS, 0.0)
-    for joint in JOINTS:
-        watch.note(joint)
-    return watch
+LONG = START_TIMEOUT
+BOTH, ELBOW = ['base', 'elbow'], ['elbow']
+LOOKS: dict[str, list[tuple[list[str], float, list[str], list[str], list[str]]]] = {
+    'a slow start is no loss, neither before the master is there nor while its drives boot': [
+        ([], 2.0, BOTH, [], []),
+        ([], 15.0, BOTH, BOTH, []),
+        (['base'], LONG, ELBOW, BOTH, []),
+        (ELBOW, LONG + PERIOD, [], [], []),
+    ],
+    'a joint that never comes is missing, such as one that bus.yml calls otherwise': [
+        (['base'], PERIOD, ELBOW, [], []),
+        ([], LONG + PERIOD, ELBOW, [], ELBOW),
+    ],
+    'a drive that is silent in two looks is missing until it is back': [
+        (BOTH, PERIOD, [], [], []),
+        ([], 2 * PERIOD, ELBOW, ELBOW, []),
+        ([], 3 * PERIOD, ELBOW, ELBOW, ELBOW),
+        ([], 4 * PERIOD, ELBOW, ELBOW, ELBOW),
+        ([], 5 * PERIOD, [], [], []),
+        ([], 6 * PERIOD, ELBOW, ELBOW, []),
+        ([], 7 * PERIOD, ELBOW, ELBOW, ELBOW),
+    ],
+    'a master that ends takes its publishers along; another one may start as slowly': [
+        (BOTH, PERIOD, [], [], []),
+        ([], 2 * PERIOD, BOTH, BOTH, []),
+        ([], 3 * PERIOD, BOTH, [], []),
+        ([], 3 * PERIOD + LONG, BOTH, BOTH, []),
+        ([], 4 * PERIOD + LONG, BOTH, BOTH, BOTH),
+    ],
+}
+"""Joints that came, when it looks in [s], which are silent, which have a publisher; missing."""
 
 
-def test_a_slow_start_is_no_loss() -> None:
-    """Neither before the master is there, nor while its drives boot."""
-    watch = SilenceWatch(JOINTS, 0.0)
-    assert watch.look(JOINTS, [], 2.0) == []
-    assert watch.look(JOINTS, JOINTS, 15.0) == []
-    assert watch.look(['elbow'], JOINTS, START_TIMEOUT) == []
-    watch.note('elbow')
-    assert watch.look([], [], START_TIMEOUT + PERIOD) == []
-
-
-def test_a_joint_that_never_comes_is_missing() -> None:
-    """Such as one that bus.yml calls otherwise."""
-    watch = SilenceWatch(JOINTS, 0.0)
-    watch.note('base')
-    watch.look(['elbow'], [], PERIOD)
-    assert watch.look(['elbow'], [], START_TIMEOUT + PERIOD) == ['elbow']
-
-
-def test_a_drive_that_is_lost_is_missing_until_it_is_back() -> None:
-    """Its publisher is there, and silent in two looks."""
-    watch = all_there()
-    watch.look([], [], PERIOD)
-    assert watch.look(['elbow'], ['elbow'], 2 * PERIOD) == []
-    assert watch.look(['elbow'], ['elbow'], 3 * PERIOD) == ['elbow']
-    assert watch.look(['elbow'], ['elbow'], 4 * PERIOD) == ['elbow']
-    assert watch.look([], [], 5 * PERIOD) == []
-    assert watch.look(['elbow'], ['elbow'], 6 * PERIOD) == []
-    assert watch.look(['elbow'], ['elbow'], 7 * PERIOD) == ['elbow']
-
-
-def test_a_master_that_ends_takes_its_publishers_along() -> None:
-    """Its states end a moment before; another one may start later, as slowly as the first."""
-    watch = all_there()
-    watch.look([], [], PERIOD)
-    assert watch.look(JOINTS, JOINTS, 2 * PERIOD) == []
-    assert watch.look(JOINTS, [], 3 * PERIOD) == []
-    assert watch.look(JOINTS, JOINTS, 3 * PERIOD + START_TIMEOUT) == []
-    assert watch.look(JOINTS, JOINTS, 4 * PERIOD + START_TIMEOUT) == JOINTS
+@pytest.mark.parametrize('case', LOOKS)
+def test_joints_that_are_missing(case: str) -> None:
+    """By what the last looks saw."""
+    watch = SilenceWatch(BOTH, 0.0)
+    for came, now, silent, published, missing in LOOKS[case]:
+        for joint in came:
+            watch.note(joint)
+        assert watch.look(silent, published, now) == missing, now

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Future
+from itertools import repeat
 from pathlib import Path
 import socket
 import threading
@@ -20,57 +21,39 @@ from arm_canopen import BusConfig, BusError, CanopenMaster, open_bus, Promise
 from arm_canopen.config import MasterConfig
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import Clock, CycleStatistics, NetworkThread
-from canopen_core.can import Bus, Frame, VirtualBus, VirtualWire
+from canopen_core.can import Frame, VirtualBus, VirtualWire
 from canopen_core.standard import CobId
 
-LATE = st.lists(st.floats(-0.001, 0.1), min_size=1, max_size=60)
+CYCLES = st.lists(st.tuples(st.floats(-0.001, 0.1), st.integers(0, 5)), min_size=1, max_size=60)
 
 
-@given(LATE, st.integers(1, 50))
-def test_percentiles_are_those_of_the_window(late: list[float], window: int) -> None:
-    """At least half (99 %) of the last cycles were not later than p50 (p99), and p99 occurred."""
+@given(CYCLES, st.integers(1, 50))
+def test_percentiles_are_those_of_the_window(cycles: list[tuple[float, int]], window: int) -> None:
+    """At least half (99 %) of the last cycles were not later than p50 (p99), and p99 occurred.
+
+    Counts do not forget what the window has forgotten; before the first cycle all figures are 0.
+    """
     statistics = CycleStatistics(0.01, window)
-    for value in late:
-        statistics.record(value, 0)
+    none = statistics.figures()
+    assert (none.cycles, none.jitter_p50, none.jitter_p99, none.jitter_max) == (0,) * 4
+    for late, skipped in cycles:
+        statistics.record(late, skipped)
     figures = statistics.figures()
-    last = late[-window:]
+    overruns = sum(skipped for _, skipped in cycles)
+    assert (figures.cycles, figures.overruns, figures.period) == (len(cycles), overruns, 0.01)
+    last = [late for late, _ in cycles[-window:]]
     assert figures.jitter_max == max(last)
     assert figures.jitter_p50 <= figures.jitter_p99 <= figures.jitter_max
     for percentile, share in ((figures.jitter_p50, 0.5), (figures.jitter_p99, 0.99)):
         assert percentile in last
-        below = sum(value <= percentile for value in last)
-        above = sum(value >= percentile for value in last)
-        assert below >= share * len(last) - 1
-        assert above >= (1.0 - share) * len(last) - 1
-
-
-@given(st.lists(st.integers(0, 5), max_size=100))
-def test_cycles_and_overruns_count_from_the_start(skipped: list[int]) -> None:
-    """Counts do not forget what the window has forgotten."""
-    statistics = CycleStatistics(0.01, 10)
-    for count in skipped:
-        statistics.record(0.0, count)
-    figures = statistics.figures()
-    assert (figures.cycles, figures.overruns) == (len(skipped), sum(skipped))
-    assert figures.period == 0.01
-
-
-def test_no_cycle_has_no_jitter() -> None:
-    """Before the first cycle all figures are 0."""
-    figures = CycleStatistics(0.01).figures()
-    assert (figures.cycles, figures.jitter_p50, figures.jitter_p99, figures.jitter_max) == (0,) * 4
-
-
-def send_for_ever(bus: Bus) -> None:
-    """Send until the bus refuses."""
-    while True:
-        bus.send(Frame(1))
+        assert sum(value <= percentile for value in last) >= share * len(last) - 1
+        assert sum(value >= percentile for value in last) >= (1.0 - share) * len(last) - 1
 
 
 def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Nobody wants the set-points of half a second ago when the cable is plugged in again."""
+    """Set-points of half a second ago are not sent when the cable is plugged in again."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     monkeypatch.setattr('canopen_core.can.socketcan._open_socket', lambda name: ours)
@@ -78,7 +61,7 @@ def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
     with theirs, open_bus('can0') as bus:
         CanopenMaster(config, bus)
         with pytest.raises(BusError, match='transmit queue of can0 is full'):
-            send_for_ever(bus)
+            any(map(bus.send, repeat(Frame(1))))
         cycle = 1 + 7 * 3  # SYNC and RPDOs
         assert 2 * cycle <= bus.counters.sent <= 4 * cycle
 
@@ -113,15 +96,25 @@ def bench() -> Iterator[Bench]:
     made.close()
 
 
-def test_a_caller_that_gives_up_does_not_hold_up_the_others(bench: Bench) -> None:
-    """A cancelled future is passed over."""
+def test_a_call_that_fails_or_is_cancelled_concerns_its_caller_alone(bench: Bench) -> None:
+    """An error reaches the future, a cancelled one is passed over, and the thread goes on."""
     gate = threading.Event()
     bench.thread.call(lambda: gate.wait(TIMEOUT))
     given_up: Future[None] = bench.thread.call(lambda: None)
+
+    def broken() -> Promise[None]:
+        raise KeyError('x')
+
+    failing = bench.thread.call(lambda: 1 // 0)
+    breaking = bench.thread.run(broken)
     after = bench.thread.call(lambda: 42)
     assert given_up.cancel()
     gate.set()
     assert after.result(TIMEOUT) == 42
+    with pytest.raises(ZeroDivisionError):
+        failing.result(TIMEOUT)
+    with pytest.raises(KeyError):
+        breaking.result(TIMEOUT)
 
 
 def test_a_defect_at_one_frame_does_not_lose_the_next(
@@ -147,19 +140,6 @@ def test_a_defect_at_one_frame_does_not_lose_the_next(
     assert done.wait(TIMEOUT)
     assert seen == [0x181, 0x182, 0x183]
     assert 'a defect in the CANopen master, at the frame' in caplog.text
-
-
-def test_an_error_of_a_call_belongs_to_its_caller(bench: Bench) -> None:
-    """It reaches the future, and the thread goes on."""
-    with pytest.raises(ZeroDivisionError):
-        bench.thread.call(lambda: 1 // 0).result(TIMEOUT)
-
-    def broken() -> Promise[None]:
-        raise KeyError('x')
-
-    with pytest.raises(KeyError):
-        bench.thread.run(broken).result(TIMEOUT)
-    assert bench.thread.call(lambda: 1).result(TIMEOUT) == 1
 
 
 def test_nobody_waits_for_a_thread_that_has_ended(bench: Bench) -> None:

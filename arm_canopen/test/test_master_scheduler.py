@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Awaitable
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,8 +13,6 @@ import pytest
 
 from arm_canopen import Promise, Scheduler, SdoError
 from arm_canopen.master.scheduler import Task
-
-Act: TypeAlias = Callable[[Scheduler, Promise[int]], None]
 
 
 def test_a_promise_keeps_its_first_end() -> None:
@@ -34,41 +32,33 @@ def test_a_promise_keeps_its_first_end() -> None:
     assert received == ['first', 'second', 'late']
 
 
-def test_an_error_is_raised_as_often_as_the_result_is_read() -> None:
-    """It passes through awaiting coroutines and can be caught there."""
-
-    async def inner() -> None:
-        raise SdoError('inside')
-
-    async def outer() -> str:
-        try:
-            await inner()
-        except SdoError as error:
-            return f'caught {error}'
-        return 'nothing'
-
-    assert Scheduler().spawn(outer()).result() == 'caught inside'
-    task = Scheduler().spawn(inner())
-    for _ in range(2):
-        with pytest.raises(SdoError, match='inside'):
-            task.result()
-
-
 def test_a_coroutine_runs_to_its_first_wait_at_once() -> None:
-    """Spawning starts; the result is that of the coroutine."""
-    steps: list[int] = []
+    """Its error can be caught where it is awaited; it is raised whenever the result is read."""
+    steps: list[str] = []
 
-    async def sequence(gate: Promise[int]) -> int:
-        steps.append(1)
+    async def inner(gate: Promise[int]) -> int:
+        steps.append('started')
         value = await gate
-        steps.append(2)
+        if value < 0:
+            raise SdoError('inside')
         return value + 1
 
-    gate: Promise[int] = Promise()
-    task = Scheduler().spawn(sequence(gate))
-    assert (steps, task.done) == ([1], False)
-    gate.resolve(4)
-    assert (steps, task.result()) == ([1, 2], 5)
+    async def outer(gate: Promise[int]) -> object:
+        try:
+            return await inner(gate)
+        except SdoError as error:
+            return f'caught {error}'
+
+    for value, expected in ((4, 5), (-1, 'caught inside')):
+        gate: Promise[int] = Promise()
+        task, failing = (Scheduler().spawn(run(gate)) for run in (outer, inner))
+        assert (steps, task.done) == (['started'] * 2, False)
+        steps.clear()
+        gate.resolve(value)
+        assert task.result() == expected
+    for _ in range(2):
+        with pytest.raises(SdoError, match='inside'):
+            failing.result()
 
 
 def test_an_error_in_the_background_is_reported() -> None:
@@ -128,35 +118,27 @@ def test_the_next_deadline_is_the_earliest_timer(delays: list[float], jumps: lis
 
 
 @pytest.mark.parametrize(
-    ('act', 'expected'),
+    ('steps', 'expected'),
     [
-        (lambda s, p: p.resolve(7), 7),
-        (lambda s, p: p.reject(SdoError('x')), SdoError),
-        (lambda s, p: s.advance(1.0), TimeoutError),
-        (lambda s, p: (s.advance(0.999), p.resolve(7)), 7),
-        (lambda s, p: (s.advance(1.0), p.resolve(7)), TimeoutError),
+        ([('resolve', 7)], 7),
+        ([('reject', SdoError('x'))], SdoError),
+        ([('advance', 1.0)], TimeoutError),
+        ([('advance', 0.999), ('resolve', 7)], 7),
+        ([('advance', 1.0), ('resolve', 7)], TimeoutError),
     ],
     ids=['result', 'error', 'time-out', 'just in time', 'too late'],
 )
-def test_waiting_ends_once(act: Act, expected: object) -> None:
+def test_waiting_ends_once(steps: list[tuple[str, Any]], expected: object) -> None:
     """With the result, with its error or with the time-out, whichever is first."""
     scheduler = Scheduler()
     promise: Promise[int] = Promise()
-    outcome: list[object] = []
-
-    async def sequence() -> None:
-        try:
-            value = await scheduler.wait(promise, 1.0)
-            outcome.append(value)
-        except (TimeoutError, SdoError) as error:
-            outcome.append(type(error))
-
-    scheduler.spawn(sequence())
+    task = scheduler.spawn(scheduler.wait(promise, 1.0))
     assert scheduler.next_deadline() == 1.0
-    act(scheduler, promise)
+    for name, value in steps:
+        getattr(scheduler if name == 'advance' else promise, name)(value)
     assert scheduler.next_deadline() is None
     scheduler.advance(5.0)
-    assert outcome == [expected]
+    assert (type(task.error) if task.error else task.result()) == expected
 
 
 def test_until_looks_whenever_time_advances() -> None:
@@ -230,56 +212,38 @@ def test_gather_waits_for_all(order: list[int], failing: set[int]) -> None:
 
 
 def test_cancelling_runs_what_must_be_run() -> None:
-    """Clean-up code runs at once, and whoever awaits gets the reason."""
+    """Clean-up code runs at once, and whoever awaits gets the first reason."""
     scheduler = Scheduler()
     seen: list[str] = []
 
-    async def inner() -> None:
+    async def cleaning(name: str, awaited: Awaitable[object]) -> int:
         try:
-            await scheduler.timer(1.0)
+            await awaited
         finally:
-            seen.append('inner')
-
-    async def outer() -> None:
-        try:
-            await inner()
-        finally:
-            seen.append('outer')
-
-    async def waits() -> str:
-        try:
-            await task
-        except SdoError as error:
-            return str(error)
-        return 'nothing'
-
-    task = scheduler.spawn(outer())
-    waiting = scheduler.spawn(waits())
-    task.cancel(SdoError('enough'))
-    task.cancel(SdoError('second'))
-    assert str(task.error) == waiting.result() == 'enough'
-    scheduler.advance(2.0)
-    assert seen == ['inner', 'outer']
-
-
-def test_only_what_was_cancelled_ends() -> None:
-    """Neither the task that it waits for, nor one that has ended already."""
-    scheduler = Scheduler()
-
-    async def long() -> int:
-        await scheduler.timer(1.0)
+            seen.append(name)
         return 3
 
-    async def waits() -> int:
-        return await other
+    def waiting(seconds: float, *names: str) -> Task[int]:
+        awaited: Awaitable[object] = scheduler.timer(seconds)
+        for name in names:
+            awaited = cleaning(name, awaited)
+        return scheduler.spawn(awaited)  # type: ignore[arg-type]
 
-    other = scheduler.spawn(long())
-    task = scheduler.spawn(waits())
+    task = waiting(1.0, 'inner', 'outer')
+    behind = scheduler.spawn(cleaning('behind', task))
+    task.cancel(SdoError('enough'))
+    task.cancel(SdoError('second'))
+    assert str(task.error) == str(behind.error) == 'enough'
+    assert sorted(seen) == ['behind', 'inner', 'outer']
+    # neither the task that one waits for ends, nor one that has ended already
+    other = waiting(1.0, 'other')
+    task = scheduler.spawn(cleaning('cancelled', other))
     task.cancel(SdoError('enough'))
     scheduler.advance(1.0)
     other.cancel(SdoError('late'))
     assert other.result() == 3
     assert isinstance(task.error, SdoError)
+    assert seen[3:] == ['cancelled', 'other']
 
 
 def test_a_task_may_be_cancelled_while_it_runs() -> None:

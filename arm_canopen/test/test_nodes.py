@@ -79,14 +79,7 @@ class Log:
     def __init__(self) -> None:
         self.warnings: list[str] = []
         self.errors: list[str] = []
-
-    def warning(self, message: str) -> None:
-        """Keep a warning."""
-        self.warnings.append(message)
-
-    def error(self, message: str) -> None:
-        """Keep an error."""
-        self.errors.append(message)
+        self.warning, self.error = self.warnings.append, self.errors.append
 
 
 class Slow:
@@ -175,20 +168,13 @@ def test_answers_are_never_left_out(slow: Slow) -> None:
 
 
 def test_nothing_is_left_out_while_ros_keeps_up(slow: Slow) -> None:
-    """Every element of a stream arrives, in order."""
-    for number in range(WAITING_MAX - 1):
+    """Every element of a stream arrives, in order; a defect of one is logged and ends no other."""
+    slow.thread.post(lambda: slow.done.append(1 // 0))
+    for number in range(WAITING_MAX - 2):
         slow.thread.post_stream('stream', partial(slow.done.append, number))
     slow.go_on()
-    assert slow.done == list(range(WAITING_MAX - 1))
+    assert slow.done == list(range(WAITING_MAX - 2))
     assert not slow.log.warnings
-
-
-def test_a_defect_of_one_message_does_not_end_the_others(slow: Slow) -> None:
-    """It is logged."""
-    slow.thread.post(lambda: slow.done.append(1 // 0))
-    slow.thread.post(partial(slow.done.append, 1))
-    slow.go_on()
-    assert slow.done == [1]
     assert 'ZeroDivisionError' in slow.log.errors[0]
 
 
@@ -310,26 +296,33 @@ def integers(draw: st.DrawFn) -> tuple[DataType, int]:
     return data_type, draw(st.integers(low, high))
 
 
-@given(st.binary(max_size=4))
+@given(st.binary(max_size=20))
 def test_up_to_four_bytes_are_little_endian(data: bytes) -> None:
-    """The 32 bits are the bytes, zero-extended."""
-    assert raw_from_bytes(data) == struct.unpack('<I', data.ljust(4, b'\0'))[0]
-
-
-@given(st.binary(min_size=5, max_size=20))
-def test_more_than_four_bytes_are_refused(data: bytes) -> None:
-    """Nothing is cut off in silence."""
+    """The 32 bits are the bytes, zero-extended; nothing is cut off in silence."""
+    if len(data) <= 4:
+        assert raw_from_bytes(data) == struct.unpack('<I', data.ljust(4, b'\0'))[0]
+        return
     with pytest.raises(CodecError, match=f'{len(data)} bytes'):
         raw_from_bytes(data)
 
 
+@pytest.mark.parametrize('data_type', LARGE, ids=lambda data_type: data_type.name)
+def test_larger_types_are_refused(data_type: DataType) -> None:
+    """What has more than 32 bits, or no fixed length, is not for this message."""
+    with pytest.raises(CodecError, match=data_type.name):
+        bytes_from_raw(data_type, 0)
+
+
 @given(integers())
 def test_numbers_may_come_as_they_are_or_with_all_32_bits(sample: tuple[DataType, int]) -> None:
-    """Zero-extended, or sign-extended as a C program would send them, they mean the same."""
+    """Zero-extended, sign-extended as a C program would send them, or as a PDO is published."""
     data_type, value = sample
-    for raw in (raw_from_bytes(encode(data_type, value)), value & 0xFFFF_FFFF):
+    mapped = MappedObject(0x2000, 0, data_type)
+    published = raw_from_number(mapped, value)
+    assert 0 <= published <= 0xFFFF_FFFF
+    for raw in (raw_from_bytes(encode(data_type, value)), value & 0xFFFF_FFFF, published):
         assert decode(data_type, bytes_from_raw(data_type, raw)) == value
-        assert number_from_raw(MappedObject(0x2000, 0, data_type), raw) == value
+        assert number_from_raw(mapped, raw) == value
 
 
 @given(st.sampled_from(SMALL_INTEGERS), RAW)
@@ -345,13 +338,6 @@ def test_what_does_not_fit_is_refused(data_type: DataType, raw: int) -> None:
         number_from_raw(MappedObject(0x2000, 0, data_type), raw)
 
 
-@pytest.mark.parametrize('data_type', LARGE, ids=lambda data_type: data_type.name)
-def test_larger_types_are_refused(data_type: DataType) -> None:
-    """What has more than 32 bits, or no fixed length, is not for this message."""
-    with pytest.raises(CodecError, match=data_type.name):
-        bytes_from_raw(data_type, 0)
-
-
 @given(st.floats(width=32, allow_nan=False))
 def test_real_numbers_travel_as_their_bits(value: float) -> None:
     """REAL32 is carried bit by bit."""
@@ -360,13 +346,3 @@ def test_real_numbers_travel_as_their_bits(value: float) -> None:
     assert raw == struct.unpack('<I', struct.pack('<f', value))[0]
     assert number_from_raw(mapped, raw) == value
     assert bytes_from_raw(DataType.REAL32, raw) == struct.pack('<f', value)
-
-
-@given(integers())
-def test_values_of_pdos_survive_a_round_trip(sample: tuple[DataType, int]) -> None:
-    """A received value, published as 32 bits and sent back, is itself."""
-    data_type, value = sample
-    mapped = MappedObject(0x2000, 0, data_type)
-    raw = raw_from_number(mapped, value)
-    assert 0 <= raw <= 0xFFFF_FFFF
-    assert number_from_raw(mapped, raw) == value
