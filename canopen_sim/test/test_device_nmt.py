@@ -63,7 +63,7 @@ def test_what_is_no_command_is_ignored(state: NmtState) -> None:
         rig.send(0, data)
     for kind in ('is_extended', 'is_remote', 'is_error'):
         for data in (b'\x01\x00', b'\x02\x00'):
-            rig.device.receive(Frame(0, data, **{kind: True}), rig.now)  # type: ignore[arg-type]
+            rig.device.receive(Frame(0, data, **{kind: True}), rig.now)
     assert rig.nmt_state is state
     assert rig.take() == []
 

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 import shutil
 import threading
 import time
+from typing import Any, NamedTuple
 
 from can_addresses import free_virtual
 from config_samples import ARTICLE_BUS
@@ -17,13 +18,13 @@ from device_rig import EDS
 import pytest
 from tool_environment import Output
 
-from arm_canopen import Event, EventKind, load_bus, SdoError, Severity
-from arm_canopen.master.network import Network
-from arm_canopen.master.runner import NetworkThread
+from arm_canopen import CanopenMaster, Event, EventKind, Severity
 from canopen_core.can import Bus, Frame, open_bus
 from canopen_core.eds import load_eds
-from canopen_sim import DeviceRunner, Fault, FaultInjection
+from canopen_sim import DeviceRunner, Fault, FaultInjection, simulated_devices
 from canopen_tools.cli.main import main
+
+pytestmark = pytest.mark.slow
 
 BUS = """\
 master:
@@ -66,6 +67,17 @@ def runner(name: str) -> Iterator[DeviceRunner]:
 
 
 @pytest.fixture
+def inject(runner: DeviceRunner) -> Callable[..., None]:
+    """Begin a fault of drive 2, or another one, now."""
+
+    def begin(fault: Fault, drive: int = 0, **settings: Any) -> None:
+        faults, injection = runner.host.devices[drive].faults, FaultInjection(fault, **settings)
+        runner.call(lambda: faults.inject(injection, time.monotonic())).result(DEADLINE)
+
+    return begin
+
+
+@pytest.fixture
 def bus_yml(tmp_path: Path) -> str:
     """A bus.yml with both drives."""
     (tmp_path / EDS.name).write_bytes(EDS.read_bytes())
@@ -98,7 +110,6 @@ def witness(name: str) -> Iterator[Bus]:
         yield bus
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_scan_finds_devices_with_and_without_heartbeat(name: str, capsys: Output) -> None:
     """Each with its state and identity; one without heartbeat by its answer."""
@@ -113,22 +124,15 @@ def test_scan_finds_devices_with_and_without_heartbeat(name: str, capsys: Output
     assert count == '2 devices'
 
 
-@pytest.mark.slow
 def test_scan_compares_with_bus_yml(
-    name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
+    name: str, inject: Callable[..., None], bus_yml: str, capsys: Output
 ) -> None:
     """A device that is another one, or is not there, makes the exit code 1."""
     assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines[1:3]] == [['2', 'left'], ['3', 'right']]
-    left, right = runner.host.devices
-
-    def misbehave() -> None:
-        now = time.monotonic()
-        left.faults.inject(FaultInjection(Fault.WRONG_IDENTITY, product=0x403), now)
-        right.faults.inject(FaultInjection(Fault.DISCONNECT), now)
-
-    runner.call(misbehave).result(DEADLINE)
+    inject(Fault.WRONG_IDENTITY, product=0x403)
+    inject(Fault.DISCONNECT, drive=1)
     assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].split()[1] == 'left'
@@ -137,17 +141,17 @@ def test_scan_compares_with_bus_yml(
     assert lines[2].endswith('not on the bus')
 
 
-@pytest.mark.slow
-def test_two_devices_with_one_node_id(name: str, runner: DeviceRunner, capsys: Output) -> None:
-    """Both answer; what they share is named."""
-    left, _ = runner.host.devices
-    inject = partial(left.faults.inject, FaultInjection(Fault.NODE_ID_CONFLICT))
-    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
+def test_two_devices_with_one_node_id(
+    name: str, inject: Callable[..., None], capsys: Output
+) -> None:
+    """Both answer; what they share is named. An empty bus is an error, with what to look at."""
+    inject(Fault.NODE_ID_CONFLICT)
     assert main(['scan', '--can', name, *LISTEN]) == 1
     assert 'node 2: several devices answer' in capsys.readouterr().err
+    assert main(['scan', '--can', free_virtual(), *LISTEN]) == 1
+    assert 'powered, wired and terminated' in capsys.readouterr().err
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures('runner', 'master')
 def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsys: Output) -> None:
     """Beside a master it only listens, and says so; --query reads, with a warning."""
@@ -171,69 +175,51 @@ def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsy
     assert 'a master is on this bus (SYNC), and shares the SDO channel' in captured.err
 
 
-@pytest.mark.slow
-def test_scan_of_an_empty_bus(name: str, capsys: Output) -> None:
-    """Nobody there is exit code 1, with what to look at."""
-    assert main(['scan', '--can', name, *LISTEN]) == 1
-    assert 'powered, wired and terminated' in capsys.readouterr().err
-
-
-@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_objects_by_name_and_number(name: str, bus_yml: str, capsys: Output) -> None:
-    """With a bus.yml by the names of its EDS, for devices by their names."""
-    arguments = ['--can', name, '--bus-config', bus_yml]
-    assert main(['read', 'left', 'statusw', '0x1018:01', '0x1008', *arguments]) == 0
+    """With a bus.yml by the names of its EDS and of the devices; without one by the standards."""
+    file = ['--can', name, '--bus-config', bus_yml]
+    assert main(['read', 'left', 'statusw', '0x1018:01', '0x1008', *file]) == 0
     assert capsys.readouterr().out.splitlines() == [
         '0x6041:00 Statusword = 0x0250 Switch on disabled',
         '0x1018:01 Vendor-ID = 0x0000FFFF',
         '0x1008:00 Manufacturer device name = "Simulated CiA 402 drive"',
     ]
-    assert main(['write', 'right', 'Profile velocity', '0x10', *arguments]) == 0
+    assert main(['write', 'right', 'Profile velocity', '0x10', *file]) == 0
     assert capsys.readouterr().out == '0x6081:00 Profile velocity = 16\n'
-    assert main(['read', '3', '0x6081', '--value', *arguments]) == 0
-    assert capsys.readouterr().out == '16\n'
+    ros = f'--ros-args -p can_interface_name:={name} -p bus_config:={bus_yml}'
+    for command, code, shown in (
+        (f'read right 0x6081 --value {ros}', 0, '16\n'),
+        (f'read 2 0x60FB --can {name}', 1, ''),
+        (f'write 2 0x607C -1 --type i32 --can {name}', 0, '0x607C:00 Home offset = -1\n'),
+        (f'read 2 0x6083 --type bytes --value --can {name}', 0, '10 27 00 00\n'),
+        (f'write 2 0x2000 1 --can {name}', 2, ''),  # its type is not guessed
+    ):
+        assert main(command.split()) == code, command
+        captured = capsys.readouterr()
+        assert captured.out == shown
+    assert 'name it with --type' in captured.err
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
-def test_objects_without_any_file(name: str, capsys: Output) -> None:
-    """What the standards describe has name and type; others have the type that is given."""
-    assert main(['read', '2', '0x60FB', '--can', name]) == 1
-    assert main(['write', '2', '0x607C', '-1', '--type', 'i32', '--can', name]) == 0
-    assert capsys.readouterr().out == '0x607C:00 Home offset = -1\n'
-    assert main(['read', '2', '0x6083', '--type', 'bytes', '--value', '--can', name]) == 0
-    assert capsys.readouterr().out == '10 27 00 00\n'
-    assert main(['write', '2', '0x2000', '1', '--can', name]) == 2  # its type is not guessed
-    assert 'name it with --type' in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ('arguments', 'code', 'message'),
-    [
-        (['read', '128', '0x1000'], 2, '128 is no node id'),
-        (['read', 'middle', '0x1000'], 2, "no device is called 'middle'; known: left, right"),
-        (['read', 'left', 'Statuswort'], 2, 'similar: 0x6041:00 Statusword'),
-        (['read', 'left', '0x2FFF'], 2, 'there is no object 0x2FFF'),
-        (['read', 'left', '0x2FFF', '--type', 'u8'], 1, 'object does not exist'),
-        (['write', 'left', 'Statusword', '1'], 2, 'is read-only (ro)'),
-        (['write', 'left', '0x6041', '1', '--type', 'u16'], 1, 'write a read-only object'),
-        (['write', 'left', '0x6060', '300'], 2, 'does not fit INTEGER8'),
-        (['read', '9', '0x1000'], 1, 'did not answer the SDO for object 0x1000:00'),
-        (['diff', '9'], 2, 'no file describes the device'),
-    ],
-)
-@pytest.mark.usefixtures('runner')
-def test_what_does_not_work_is_reported(
-    name: str, bus_yml: str, *, arguments: list[str], code: int, message: str, capsys: Output
-) -> None:
+def test_what_does_not_work_is_reported(name: str, bus_yml: str, capsys: Output) -> None:
     """2 for what the command line or files rule out, 1 for what a device answers."""
-    assert main([*arguments, '--can', name, '--bus-config', bus_yml]) == code
-    assert message in capsys.readouterr().err
+    for command, code, message in (
+        ('read 128 0x1000', 2, '128 is no node id'),
+        ('read middle 0x1000', 2, "no device is called 'middle'; known: left, right"),
+        ('read left Statuswort', 2, 'similar: 0x6041:00 Statusword'),
+        ('read left 0x2FFF', 2, 'there is no object 0x2FFF'),
+        ('read left 0x2FFF --type u8', 1, 'object does not exist'),
+        ('write left Statusword 1', 2, 'is read-only (ro)'),
+        ('write left 0x6041 1 --type u16', 1, 'write a read-only object'),
+        ('write left 0x6060 300', 2, 'does not fit INTEGER8'),
+        ('read 9 0x1000', 1, 'did not answer the SDO for object 0x1000:00'),
+        ('diff 9', 2, 'no file describes the device'),
+    ):
+        assert main([*command.split(), '--can', name, '--bus-config', bus_yml]) == code, command
+        assert message in capsys.readouterr().err
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ('deviation', 'warning'),
     [
@@ -243,18 +229,11 @@ def test_what_does_not_work_is_reported(
     ],
 )
 def test_answers_that_deviate_are_read_as_the_master_reads_them(
-    name: str,
-    runner: DeviceRunner,
-    bus_yml: str,
-    *,
-    deviation: Fault,
-    warning: str,
+    name: str, inject: Callable[..., None], bus_yml: str, *, deviation: Fault, warning: str,
     capsys: Output,
-) -> None:
+) -> None:  # fmt: skip
     """Cut to the type of the object, and what is odd is said once beside them."""
-    left = runner.host.devices[0]
-    inject = partial(left.faults.inject, FaultInjection(deviation))
-    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
+    inject(deviation)
     arguments = ['--can', name, '--bus-config', bus_yml]
     assert main(['write', 'left', '0x6098', '-3', *arguments]) == 0
     capsys.readouterr()
@@ -265,7 +244,6 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     assert warning in captured.err
 
 
-@pytest.mark.slow
 def test_a_device_that_holds_something_else_is_reported(
     name: str, witness: Bus, capsys: Output
 ) -> None:
@@ -289,17 +267,15 @@ def test_a_device_that_holds_something_else_is_reported(
     assert 'holds another value than 7' in captured.err
 
 
-@pytest.mark.slow
-def test_a_command_is_not_read_back(name: str, runner: DeviceRunner, capsys: Output) -> None:
+def test_a_command_is_not_read_back(
+    name: str, inject: Callable[..., None], capsys: Output
+) -> None:
     """0x1010 returns what the device can store, not what was written; storing takes its time."""
-    slow = FaultInjection(Fault.SDO_DELAY, object=(0x1010, 1), delay=0.7)
-    inject = runner.host.devices[0].faults.inject
-    runner.call(lambda: inject(slow, time.monotonic())).result(DEADLINE)
+    inject(Fault.SDO_DELAY, object=(0x1010, 1), delay=0.7)
     assert main(['write', '2', '0x1010:1', '0x65766173', '--type', 'u32', '--can', name]) == 0
     assert capsys.readouterr().out.endswith('was written\n')
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_diff_shows_what_bus_yml_has_otherwise(name: str, bus_yml: str, capsys: Output) -> None:
     """Only what differs, with the line of bus.yml; equal when it was written."""
@@ -321,146 +297,87 @@ def test_diff_shows_what_bus_yml_has_otherwise(name: str, bus_yml: str, capsys: 
     assert output.splitlines()[-1].endswith('objects compared, none different')
 
 
-@pytest.mark.slow
 def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
-    name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
+    name: str, inject: Callable[..., None], bus_yml: str, capsys: Output
 ) -> None:
-    """Boot writes to the first one where a device lets nobody read it, and not behind it."""
+    """Boot writes to the first one where none can be read, and not behind it.
 
-    def refuse() -> None:
-        fault = FaultInjection(Fault.SDO_ABORT, object=(0x1016, 1))
-        runner.host.devices[0].faults.inject(fault, time.monotonic())
-
-    runner.call(refuse).result(DEADLINE)
-    assert main(['diff', 'left', '--can', name, '--bus-config', bus_yml]) == 1
-    rows = [line for line in capsys.readouterr().out.splitlines() if '0x1016' in line]
-    assert [row.split()[1] for row in rows] == ['0x1016:01']
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures('runner')
-def test_diff_with_an_eds(name: str, capsys: Output) -> None:
-    """Without bus.yml the defaults of all objects that can be written count."""
+    Without bus.yml the defaults of all objects that can be written count.
+    """
     assert main(['diff', '2', '--can', name, '--eds', str(EDS)]) == 0
     main(['write', '2', '0x6098', '35', '--type', 'i8', '--can', name])
     assert main(['diff', '2', '--can', name, '--eds', str(EDS)]) == 1
     assert capsys.readouterr().out.splitlines()[-2].split() == (
         ['*', '0x6098:00', 'Homing', 'method', '0', '35', 'EDS']
     )
+    inject(Fault.SDO_ABORT, object=(0x1016, 1))
+    assert main(['diff', 'left', '--can', name, '--bus-config', bus_yml]) == 1
+    rows = [line for line in capsys.readouterr().out.splitlines() if '0x1016' in line]
+    assert [row.split()[1] for row in rows] == ['0x1016:01']
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures('runner')
-def test_parameters_of_ros_name_bus_and_file(name: str, bus_yml: str, capsys: Output) -> None:
-    """The parameters of the nodes work here too."""
-    ros = ['--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={bus_yml}']
-    assert main(['read', 'left', 'Statusword', '--value', *ros]) == 0
-    assert capsys.readouterr().out == '592\n'
-
-
-MASTER_DEADLINE = 20.0  # [s]
-
-
-class Robot:
+class Robot(NamedTuple):
     """The article's master and two of its joints, on a bus of this process."""
 
-    def __init__(self, folder: Path) -> None:
-        self.name = free_virtual()  # name of the bus
-        shutil.copy(EDS, folder / 'cia402_slave.eds')
-        text = ARTICLE_BUS.read_text('utf-8')
-        self.bus_yml = folder / 'bus.yml'  # its configuration
-        self.bus_yml.write_text(text[: text.index('  panda_joint3:')], 'utf-8')
-        config = load_bus(self.bus_yml)
-        self.events: list[Event] = []  # what the master reported
-        self._buses = [open_bus(self.name) for _ in range(2)]
-        self._devices = DeviceRunner(self._buses[0])
-        for node in config.nodes:
-            self._devices.host.add(node.node_id, node.dictionary)
-        self.network = Network(config, self._buses[1].send, self.events.append)  # the master
-        self.thread = NetworkThread(self._buses[1], self.network)  # the master's thread
-        self._devices.start()
-        self.thread.start()
-        self._await_boot()
+    master: CanopenMaster
+    arguments: list[str]  # of a verb on this bus
+    events: list[Event]  # what the master reported
 
-    @property
-    def complaints(self) -> list[str]:
-        """What the master reported as warnings or errors, but for a computer that is too busy."""
-        return [
+    def assert_undisturbed(self) -> None:
+        """Assert that all is online, and nothing was reported but a computer that is too busy."""
+        assert all(each.status().online for each in self.master.devices.values())
+        assert not [
             str(event)
             for event in self.events
             if event.severity >= Severity.WARNING and event.kind is not EventKind.CYCLE
         ]
 
-    def all_online(self) -> bool:
-        """Return whether every device is booted and has not been lost."""
-        return all(node.online for node in self.network.nodes.values())
-
-    def end(self) -> None:
-        """End everything."""
-        self.thread.stop()
-        self._devices.stop()
-        for bus in self._buses:
-            bus.close()
-
-    def _await_boot(self) -> None:
-        end = time.monotonic() + MASTER_DEADLINE
-        while not self.thread.call(self.all_online).result(MASTER_DEADLINE):
-            assert time.monotonic() < end, [str(event) for event in self.events]
-            time.sleep(0.01)
-
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Iterator[Robot]:
+def robot(tmp_path: Path, name: str) -> Iterator[Robot]:
     """A robot that runs."""
-    made = Robot(tmp_path)
-    yield made
-    made.end()
+    shutil.copy(EDS, tmp_path / 'cia402_slave.eds')
+    text, path = ARTICLE_BUS.read_text('utf-8'), tmp_path / 'bus.yml'
+    path.write_text(text[: text.index('  panda_joint3:')], 'utf-8')
+    events: list[Event] = []
+    with (
+        simulated_devices(path, name),
+        CanopenMaster.from_bus_yml(path, name, on_event=events.append) as master,
+    ):
+        master.boot(DEADLINE)
+        yield Robot(master, ['--can', name, '--bus-config', str(path)], events)
 
 
-def test_the_booted_devices_are_as_the_files_say(
-    robot: Robot, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Diff finds nothing that the master has not written, and scan nobody else."""
-    arguments = ['--can', robot.name, '--bus-config', str(robot.bus_yml)]
+def test_the_booted_devices_are_as_the_files_say(robot: Robot, capsys: Output) -> None:
+    """Diff finds nothing that the master has not written, and scan no other device."""
     for name in ('panda_joint1', 'panda_joint2'):
-        assert main(['diff', name, *arguments]) == 0, capsys.readouterr().out
-    assert main(['scan', *arguments, '--listen', '1.2']) == 0
+        assert main(['diff', name, *robot.arguments]) == 0, capsys.readouterr().out
+    assert main(['scan', *robot.arguments, '--listen', '1.2']) == 0
     rows = capsys.readouterr().out.splitlines()[-3:-1]
     assert [row.split() for row in rows] == [
         ['2', 'panda_joint1', 'operational'],
         ['3', 'panda_joint2', 'operational'],
     ]
-    assert robot.complaints == []
+    robot.assert_undisturbed()
 
 
 def test_the_master_is_not_disturbed(robot: Robot) -> None:
     """While it reads and writes all the time, others read, and nothing of it fails."""
     stop = threading.Event()
-    failures: list[SdoError] = []
-    transfers = 0
 
-    def keep_busy() -> None:
-        nonlocal transfers
-        node = robot.network.nodes['panda_joint1']
-        while not stop.is_set():
-            try:
-                robot.thread.run(lambda: node.sdo.read(0x6083, 0, 1.0)).result(MASTER_DEADLINE)
-                transfers += 1
-            except SdoError as error:
-                failures.append(error)
-            stop.wait(0.03)
+    def keep_busy() -> int:
+        transfers = 0
+        while not stop.wait(0.03):
+            robot.master.sdo('panda_joint1').read(0x6083)
+            transfers += 1
+        return transfers
 
-    thread = threading.Thread(target=keep_busy)
-    thread.start()
-    try:
-        arguments = ['--can', robot.name, '--bus-config', str(robot.bus_yml)]
+    with ThreadPoolExecutor(1) as pool:
+        busy = pool.submit(keep_busy)
         former = '--ask'  # codespell:ignore ask
-        assert main(['scan', *arguments, former, '--listen', '0.2']) == 0
-        assert main(['diff', 'panda_joint1', *arguments]) == 0
-    finally:
+        scanned = main(['scan', *robot.arguments, former, '--listen', '0.2'])
+        compared = main(['diff', 'panda_joint1', *robot.arguments])
         stop.set()
-        thread.join()
-    assert transfers > 5
-    assert failures == []
-    assert robot.complaints == []
-    assert robot.thread.call(robot.all_online).result(MASTER_DEADLINE)
+        assert busy.result(DEADLINE) > 5
+    assert (scanned, compared) == (0, 0)
+    robot.assert_undisturbed()
