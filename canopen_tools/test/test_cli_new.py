@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -26,6 +27,7 @@ from canopen_tools.cli.main import main
 
 DRIVE = REPOSITORY / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 CYCLIC_AND_PROFILE = Row(0x6502, 0, 'Supported drive modes', 7, 'ro', '0x81')
+ONLY_VELOCITY = replace(CYCLIC_AND_PROFILE, default='0x4')
 GEAR = (
     Row(0x6091, 0, 'Highest sub-index', 5, 'const', '2'),
     Row(0x6091, 1, 'Motor revolutions', 7, 'rw', '100'),
@@ -36,6 +38,7 @@ INTERPOLATION = (
     Row(0x60C1, 1, 'First set-point', 4, 'rww', '0', mappable=True),
 )
 SAMPLE = (*DRIVE_ROWS, *FACTOR_ROWS, *GEAR, *INTERPOLATION, CYCLIC_AND_PROFILE)
+UNMAPPED = tuple(replace(row, mappable=False) if row.index == 0x6041 else row for row in SAMPLE)
 PUMP = tuple(
     replace(row, default='0x00030191') if row.index == 0x1000 else row
     for row in DRIVE_ROWS
@@ -46,7 +49,13 @@ DEADLINE = 20.0  # [s]
 CLEAN = ': 0 errors, 0 warnings'
 OPTIONAL = (0x6060, 0x6061, 0x606C, 0x603F)
 NEEDED = (0x6040, 0x6041, 0x6064, 0x607A, 0x60C1)
-TWO_AXES = DRIVE.with_name('cia402_two_axes.eds')
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The present folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def written(folder: Path, name: str, rows: Sequence[Row]) -> Path:
@@ -79,42 +88,54 @@ def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: Output) -> None:
     units = ['--turn', 'elbow=-36000', '--metre', 'lift=50000']
     assert main(['new', *devices, *units, '--output', str(bus_yml)]) == 0
     assert CLEAN in capsys.readouterr().out
+    with running(bus_yml) as master:
+        for name, counts in (('shoulder', 1000.0), ('elbow', -36000 / TURN), ('lift', 50000)):
+            follow(master, name, 0.02)
+            assert master.sdo(name).read(0x6064) == pytest.approx(0.02 * counts, rel=0.06)
+
+
+def test_devices_of_several_kinds(folder: Path, capsys: Output) -> None:
+    """Each has its own block, and a drive the target of its mode; what is none keeps its PDOs."""
+    seventh = replace(CYCLIC_AND_PROFILE, default='0x41')
+    written(folder, 'drive.eds', SAMPLE)
+    written(folder, 'pump.eds', PUMP)
+    written(folder, 'both.eds', [*without(0x6502), seventh])
+    written(folder, 'profile.eds', [*without(0x6502, 0x60C1), seventh])
+    devices = ['arm=drive.eds@1', 'pump=pump.eds@0x10', f'lift={DRIVE}@3']
+    devices += ['a=both.eds@4', 'b=profile.eds@5']
+    assert main(['new', *devices, '--period', '4']) == 0
+    assert CLEAN in capsys.readouterr().out
+    config = load_bus(Path('bus.yml'))
+    assert [(node.name, node.is_drive) for node in config.nodes] == [
+        (name, name != 'pump') for name in ('arm', 'pump', 'lift', 'a', 'b')
+    ]
+    assert config.master.node_id == 2
+    assert (folder / DRIVE.name).read_bytes() == DRIVE.read_bytes()
+    last = config.nodes[-2:]
+    assert [node.axes[0].position_mode for node in last] == [7, 1]
+    mapped = [each.mapping[1] for node in last for each in node.rpdos if each.mapping]
+    assert [(each.index, each.subindex) for each in mapped] == [(0x60C1, 1), (0x607A, 0)]
+
+
+def ones() -> tuple[Row, ...]:
+    """Return the rows of a drive whose factor group was never set: all ratios are 1."""
+    ratios = (0x608F, 0x6091, 0x6092)
+    return tuple(
+        replace(row, default='1') if row.index in ratios and row.subindex else row
+        for row in SAMPLE
+    )
+
+
+@contextmanager
+def running(bus_yml: Path) -> Iterator[CanopenMaster]:
+    """Boot a bus of simulated drives."""
     bus = free_virtual()
     with (
         simulated_devices(bus_yml, bus=bus),
         CanopenMaster.from_bus_yml(bus_yml, bus=bus) as master,
     ):
         master.boot()
-        for name, counts in (('shoulder', 1000.0), ('elbow', -36000 / TURN), ('lift', 50000)):
-            follow(master, name, 0.02)
-            assert master.sdo(name).read(0x6064) == pytest.approx(0.02 * counts, rel=0.06)
-
-
-def test_devices_of_several_kinds(tmp_path: Path, capsys: Output) -> None:
-    """Each has its own block; what is no drive keeps its PDOs."""
-    drive, pump = written(tmp_path, 'drive.eds', SAMPLE), written(tmp_path, 'pump.eds', PUMP)
-    bus_yml = tmp_path / 'bus.yml'
-    devices = [f'arm={drive}@1', f'pump={pump}@0x10', f'lift={DRIVE}@3']
-    assert main(['new', *devices, '--period', '4', '--output', str(bus_yml)]) == 0
-    output = capsys.readouterr().out
-    assert CLEAN in output
-    config = load_bus(bus_yml)
-    assert [(node.name, node.is_drive) for node in config.nodes] == [
-        ('arm', True),
-        ('pump', False),
-        ('lift', True),
-    ]
-    assert config.master.node_id == 2
-    assert (tmp_path / DRIVE.name).read_bytes() == DRIVE.read_bytes()
-
-
-def ones() -> tuple[Row, ...]:
-    """Return the rows of a drive whose factor group nobody has set: all ratios are 1."""
-    ratios = (0x608F, 0x6091, 0x6092)
-    return tuple(
-        replace(row, default='1') if row.index in ratios and row.subindex else row
-        for row in SAMPLE
-    )
+        yield master
 
 
 @pytest.mark.parametrize(
@@ -139,12 +160,7 @@ def test_a_drive_that_counts_in_rpm_follows(
     (node,) = load_bus(bus_yml).nodes
     assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
     assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
-    bus = free_virtual()
-    with (
-        simulated_devices(bus_yml, bus=bus),
-        CanopenMaster.from_bus_yml(bus_yml, bus=bus) as master,
-    ):
-        master.boot()
+    with running(bus_yml) as master:
         follow(master, 'arm', 0.5)
 
 
@@ -191,11 +207,9 @@ def test_velocity_is_in_the_unit_that_the_eds_names(
         assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text()
 
 
-def test_an_epos4_is_asked_for_its_gear(
-    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures('folder')
+def test_an_epos4_is_asked_for_its_gear(capsys: Output) -> None:
     """Its EDS says rpm; with the gear the scales are those of the bus.yml that is shipped."""
-    monkeypatch.chdir(tmp_path)
     folder = REPOSITORY / 'tests' / 'drives' / 'epos4'
     new = ['new', f'shoulder={folder / "epos4_objects.eds"}@1', '--turn', 'shoulder=83200']
     assert main(new) != 0
@@ -218,110 +232,63 @@ def test_what_the_master_reads_from_the_drive_is_not_written_out(tmp_path: Path,
     assert 'scale_acc_to_dev' in text
 
 
-def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:
-    """Interpolated position has another one, with a sub-index."""
-    seventh = replace(CYCLIC_AND_PROFILE, default='0x41')
-    both = written(tmp_path, 'both.eds', [*without(0x6502), seventh])
-    profile = written(tmp_path, 'profile.eds', [*without(0x6502, 0x60C1), seventh])
-    bus_yml = tmp_path / 'bus.yml'
-    devices = [f'a={both}@2', f'b={profile}@3']
-    assert main(['new', *devices, '--output', str(bus_yml)]) == 0
-    first, second = load_bus(bus_yml).nodes
-    assert [node.axes[0].position_mode for node in (first, second)] == [7, 1]
-    mapped = [each.mapping[1] for node in (first, second) for each in node.rpdos if each.mapping]
-    assert [(each.index, each.subindex) for each in mapped] == [(0x60C1, 1), (0x607A, 0)]
+NO_COUNTS = 'how far an increment of the joint is'
+ASKED: list[tuple[Sequence[Row], str, str]] = [
+    (without(0x6502), '', r'arm: drive\.eds has no 0x6502.*--mode arm=8'),
+    ((*without(0x6502), ONLY_VELOCITY), '', r'names no position mode in 0x6502 \(0x00000004\)'),
+    (without(0x608F, 0x6092), '', f'{NO_COUNTS}.*--turn arm='),
+    (without(0x6091), '', 'with the gear in 0x6091.*--turn arm=.*--metre arm='),
+    (ones(), '', NO_COUNTS),
+    (without(0x607A), '', '0x607A: the EDS lacks it.*no set-points'),
+    (SAMPLE, '--mode arm=7 --mode arm=8', 'arm has one already'),
+    (UNMAPPED, '', '0x6041: the EDS says it cannot be mapped.*correct the EDS'),
+    (without(*range(0x1800, 0x1806)), '', '0x6041: the EDS has 0 TPDOs that can be mapped'),
+    (SAMPLE, '--turn leg=1', "no drive 'leg'; drives: arm"),
+    (SAMPLE, '--turn arm=0', '--turn arm=0: give a number of increments'),
+    (SAMPLE, '--rpm arm=-3', 'arm=-3: give turns of the motor .*a number above 0 .without sign.'),
+    (without(0x6091), '--rpm arm=100', NO_COUNTS),
+    ((*SAMPLE, RPM), '--turn arm=1000', '0x60A9 of the EDS has 1 turns/min .*--rpm arm=TURNS'),
+    ((*SAMPLE, RPM), '--metre arm=1000', 'turns of the motor for 1 m of the joint'),
+    ((*SAMPLE, METRES), '--turn arm=1000', '1 m/s .*correct 0x60A9 in the EDS'),
+    (SAMPLE, '--turn arm=far', '--turn arm=far: give a number'),
+    (without(0x60C1), '--mode arm=7', '0x60C1: the EDS lacks it.*no set-points'),
+    (SAMPLE, '--mode arm=3', '--mode arm=3: choose one of 8 .cyclic position'),
+    (SAMPLE, 'drive.eds@2', 'is no device; write it as shoulder=drive.eds@2'),
+    (SAMPLE, '2=drive.eds@2', 'is no device'),
+    (SAMPLE, 'leg=drive.eds@128', '128 is no node id'),
+    (SAMPLE, 'arm=drive.eds@3', 'name arm is there twice'),
+    (SAMPLE, 'leg=drive.eds@5', 'node id 5 is there twice'),
+    (SAMPLE, 'leg=other.eds@2', 'no such file'),
+    (SAMPLE, f'leg={DRIVE.with_name("cia402_two_axes.eds")}@2', 'has axes at 0x6040, 0x6840'),
+]
 
 
-def test_several_axes_are_not_made_one(
-    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It is said what to write."""
-    monkeypatch.chdir(tmp_path)
-    assert main(['new', f'arm={TWO_AXES}@2', '--turn', 'arm=1000']) == 1
-    assert 'has axes at 0x6040, 0x6840' in capsys.readouterr().err
-    assert not (tmp_path / 'bus.yml').exists()
-
-
-@pytest.mark.parametrize(
-    ('rows', 'options', 'words'),
-    [
-        (without(0x6502), [], r'arm: drive\.eds has no 0x6502.*--mode arm=8'),
-        (
-            (*without(0x6502), replace(CYCLIC_AND_PROFILE, default='0x4')),
-            [],
-            r'names no position mode in 0x6502 \(0x00000004\)',
-        ),
-        (without(0x608F, 0x6092), [], 'how far an increment of the joint is.*--turn arm='),
-        (without(0x6091), [], 'with the gear in 0x6091.*--turn arm=.*--metre arm='),
-        (ones(), [], 'how far an increment of the joint is'),
-        (without(0x607A), [], '0x607A: the EDS lacks it.*no set-points'),
-        (SAMPLE, ['--mode', 'arm=7', '--mode', 'arm=8'], 'arm has one already'),
-        (
-            tuple(replace(row, mappable=False) if row.index == 0x6041 else row for row in SAMPLE),
-            [],
-            '0x6041: the EDS says it cannot be mapped.*correct the EDS',
-        ),
-        (without(*range(0x1800, 0x1806)), [], '0x6041: the EDS has 0 TPDOs that can be mapped'),
-        (SAMPLE, ['--turn', 'leg=1'], "no drive 'leg'; drives: arm"),
-        (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
-        (
-            SAMPLE,
-            ['--rpm', 'arm=-3'],
-            '--rpm arm=-3: give turns of the motor .*a number above 0 .without sign.',
-        ),
-        (without(0x6091), ['--rpm', 'arm=100'], 'how far an increment of the joint is'),
-        (
-            (*SAMPLE, RPM),
-            ['--turn', 'arm=1000'],
-            '0x60A9 of the EDS has 1 turns/min .*of which shaft; give --rpm arm=TURNS',
-        ),
-        ((*SAMPLE, RPM), ['--metre', 'arm=1000'], 'turns of the motor for 1 m of the joint'),
-        ((*SAMPLE, METRES), ['--turn', 'arm=1000'], '1 m/s .*correct 0x60A9 in the EDS'),
-        (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
-        (without(0x60C1), ['--mode', 'arm=7'], '0x60C1: the EDS lacks it.*no set-points'),
-        (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),
-        (SAMPLE, ['drive.eds@2'], 'is no device; write it as shoulder=drive.eds@2'),
-        (SAMPLE, ['2=drive.eds@2'], 'is no device'),
-        (SAMPLE, ['leg=drive.eds@128'], '128 is no node id'),
-        (SAMPLE, ['arm=drive.eds@3'], 'name arm is there twice'),
-        (SAMPLE, ['leg=drive.eds@5'], 'node id 5 is there twice'),
-        (SAMPLE, ['leg=other.eds@2'], 'no such file'),
-    ],
-)
+@pytest.mark.parametrize(('rows', 'options', 'words'), ASKED)
 def test_what_is_not_said_is_asked_for(
-    *,
-    rows: Sequence[Row],
-    options: Sequence[str],
-    words: str,
-    tmp_path: Path,
-    capsys: Output,
-    monkeypatch: pytest.MonkeyPatch,
+    *, rows: Sequence[Row], options: str, words: str, folder: Path, capsys: Output
 ) -> None:
     """With the option or the way to write it; no file is written."""
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', rows)
-    assert main(['new', 'arm=drive.eds@5', *options]) != 0
+    written(folder, 'drive.eds', rows)
+    assert main(['new', 'arm=drive.eds@5', *options.split()]) != 0
     assert re.search(words, capsys.readouterr().err)
-    assert not (tmp_path / 'bus.yml').exists()
+    assert not Path('bus.yml').exists()
 
 
-def test_nothing_is_overwritten(
-    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_overwritten(folder: Path, capsys: Output) -> None:
     """Neither a bus.yml, unless --force says so, nor an EDS of the same name."""
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', SAMPLE)
-    (tmp_path / 'bus.yml').write_text('mine')
+    written(folder, 'drive.eds', SAMPLE)
+    bus_yml = folder / 'bus.yml'
+    bus_yml.write_text('mine')
     assert main(['new', 'arm=drive.eds@2']) == 2
-    assert (tmp_path / 'bus.yml').read_text() == 'mine'
+    assert bus_yml.read_text() == 'mine'
     assert main(['new', 'arm=drive.eds@2', '--force']) == 0
-    (tmp_path / 'other').mkdir()
-    written(tmp_path / 'other', 'drive.eds', without(0x603F))
+    (folder / 'other').mkdir()
+    written(folder / 'other', 'drive.eds', without(0x603F))
     assert main(['new', 'arm=drive.eds@2', '--output', 'other/bus.yml']) == 2
     assert 'rename one' in capsys.readouterr().err
     devices = ['arm=drive.eds@2', 'leg=other/drive.eds@3']
     assert main(['new', *devices, '--output', 'third/bus.yml']) == 2
-    assert not (tmp_path / 'third').exists()
+    assert not (folder / 'third').exists()
 
 
 @pytest.mark.parametrize(
@@ -353,13 +320,12 @@ def test_a_person_is_asked_for_what_the_eds_does_not_say(
     answers: Sequence[str],
     scale: str,
     value: float,
-    tmp_path: Path,
+    folder: Path,
     capsys: Output,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Increments, then turns of the motor; again after what is no such number."""
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', rows)
+    written(folder, 'drive.eds', rows)
     monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
     given = iter(answers)
     monkeypatch.setattr('builtins.input', lambda asked: next(given) if 'arm' in asked else '')
@@ -368,7 +334,7 @@ def test_a_person_is_asked_for_what_the_eds_does_not_say(
         "(?m)^give .*a number .* such as .*, not '(.*)'", capsys.readouterr().out
     )
     assert asked_again == answers[:-1]
-    (node,) = load_bus(tmp_path / 'bus.yml').nodes
+    (node,) = load_bus(folder / 'bus.yml').nodes
     assert getattr(node.drive, f'scale_{scale}_to_dev') == pytest.approx(value)
 
 
