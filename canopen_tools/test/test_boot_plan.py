@@ -24,8 +24,9 @@ from arm_canopen.config import (
 from arm_canopen.config.model.boot_plan import WATCH_KEY
 from arm_canopen.master.configuration import Configurator
 from canopen_core.standard import ObjectDictionary, pdo_object
+from canopen_sim.object_store import ObjectStore
 from canopen_tools.cli.dcf import device_writes
-from canopen_tools.cli.objects import expected_defaults, expected_objects
+from canopen_tools.cli.objects import expected_objects
 
 OTHER = 9 << 16 | 500  # an entry of 0x1016 that watches node 9
 
@@ -161,31 +162,22 @@ def test_a_complete_dcf_holds_the_plan() -> None:
     assert all(item.fits(last[item.address]) for item in kept if item.address in last)
 
 
-@pytest.mark.parametrize(
-    ('data', 'mask', 'device', 'fits'),
-    [
+def test_comparison() -> None:
+    """Bits that do not count make no difference."""
+    for data, mask, device, fits in (
         (b'\x05', None, b'\x05', True),
         (b'\x05', None, b'\x06', False),
         (b'\x05\0', None, b'\x05', False),
         (b'\x82\x01\0\0', 0x800007FF, b'\x82\x01\0\x40', True),
         (b'\x82\x01\0\0', 0x800007FF, b'\x82\x01\0\x80', False),
         (b'text that is long', None, b'text that is long', True),
-    ],
-)
-def test_comparison(data: bytes, mask: int | None, device: bytes, fits: bool) -> None:
-    """Bits that do not count make no difference."""
-    assert BootWrite(0x2000, 0, data, '', mask=mask).fits(device) is fits
-
-
-def test_defaults_are_of_objects_that_can_be_written() -> None:
-    """What the device says by itself (statusword, identity) has no default to compare."""
-    node = drive_config('joint1', 2)
-    indices = {item.index for item in expected_defaults(node.dictionary)}
-    assert 0x6081 in indices
-    assert not indices & {0x6041, 0x1018, 0x1000}
+    ):
+        assert BootWrite(0x2000, 0, data, '', mask=mask).fits(device) is fits, (data, device)
 
 
 NAME = 'joint'
+PLACES = (0x1800, 2), (0x1800, 3), (0x1A00, 0), (0x1A00, 1), (0x2000, 0)
+
 BUS = """
 master: {node_id: 1, driver: ros2_canopen::MasterDriver, package: canopen_master_driver}
 joint:
@@ -204,7 +196,7 @@ DefaultValue=7
 """
 
 
-def load(folder: Path, changes: dict[str, str], extra: str = '', bus: str = '') -> BusConfig:
+def load(folder: Path, changes: dict[str, str], extra: str = '') -> BusConfig:
     """Load a bus whose device has a DCF with ParameterValues by section."""
     text = eds_text() + OWN_OBJECT
     for section, value in changes.items():
@@ -212,7 +204,7 @@ def load(folder: Path, changes: dict[str, str], extra: str = '', bus: str = '') 
         text = text.replace(f'[{section}]\n', f'[{section}]\nParameterValue={value}\n')
     (folder / 'device.dcf').write_text(text)
     path = folder / 'bus.yml'
-    path.write_text(BUS + bus + extra)
+    path.write_text(BUS + extra)
     return load_bus(path)
 
 
@@ -225,12 +217,12 @@ def written(config: BusConfig) -> dict[tuple[int, int], int]:
     }
 
 
-def booted(node: NodeConfig, dictionary: ObjectDictionary) -> VirtualNetwork:
+def booted(node: NodeConfig, dictionary: ObjectDictionary) -> ObjectStore:
     """Boot a device that has the defaults of the EDS, not the values of the DCF."""
     net = VirtualNetwork(bus_config(node), dictionaries={NAME: dictionary})
     net.start()
     net.run_until(lambda: net.network.nodes[NAME].online)
-    return net
+    return net.devices[NAME].store
 
 
 def test_a_value_that_is_not_the_default_is_written_at_boot(tmp_path: Path) -> None:
@@ -238,28 +230,30 @@ def test_a_value_that_is_not_the_default_is_written_at_boot(tmp_path: Path) -> N
     (plain,) = load(tmp_path, {}).nodes
     config = load(tmp_path, {'2000': '8'})
     assert written(config) == {(0x2000, 0): 8}
-    net = booted(config.nodes[0], plain.dictionary)
-    assert net.devices[NAME].store.read(0x2000) == b'\x08\x00'
+    assert booted(config.nodes[0], plain.dictionary).read(0x2000) == b'\x08\x00'
     both = load(tmp_path, {'2000': '8'}, '  sdo: [{index: 0x2000, sub_index: 0, value: 9}]\n')
-    net = booted(both.nodes[0], plain.dictionary)
-    assert net.devices[NAME].store.read(0x2000) == b'\x09\x00'
-
-
-def test_an_eds_and_a_default_write_nothing(tmp_path: Path) -> None:
-    """A ParameterValue that is the DefaultValue costs no time at boot."""
-    assert written(load(tmp_path, {})) == {}
-    assert written(load(tmp_path, {'2000': '0x7'})) == {}
+    assert booted(both.nodes[0], plain.dictionary).read(0x2000) == b'\x09\x00'
 
 
 @pytest.mark.parametrize(
-    'section',
-    ['1000', '1018sub1', '1017', '1800sub2', '1A00sub1'],
-    ids=['const', 'identity', 'heartbeat', 'pdo', 'mapping'],
+    ('section', 'value'),
+    [
+        ('2000', '0x7'),  # the default
+        ('1000', '1'),  # const
+        ('1018sub1', '1'),  # identity
+        ('1017', '250'),  # heartbeat
+        ('1800sub2', '1'),
+        ('1A00sub1', '0x60410010'),
+    ],
 )
-def test_what_another_key_configures_is_not_written_twice(tmp_path: Path, section: str) -> None:
+def test_what_another_key_configures_is_not_written_twice(
+    tmp_path: Path, section: str, value: str
+) -> None:
     """Constants are compared, heartbeat and PDOs written by their own rules."""
-    config = load(tmp_path, {section: '1' if section != '1A00sub1' else '0x60410010'})
-    assert written(config) == {}
+    config = load(tmp_path, {section: value})
+    assert written(config) == written(load(tmp_path, {})) == {}
+    heartbeat = config.nodes[0].heartbeat_producer
+    assert heartbeat == pytest.approx(0.25 if section == '1017' else 0.0)
 
 
 def test_commands_are_not_written_and_that_is_said(tmp_path: Path) -> None:
@@ -271,29 +265,29 @@ def test_commands_are_not_written_and_that_is_said(tmp_path: Path) -> None:
     assert 'device.dcf' in reported[0]
 
 
-def test_the_heartbeat_of_a_dcf_counts(tmp_path: Path) -> None:
-    """It is what the device shall have where bus.yml says nothing."""
-    (node,) = load(tmp_path, {'1017': '250'}).nodes
-    assert node.heartbeat_producer == pytest.approx(0.25)
-
-
 def test_a_pdo_of_a_dcf_is_configured(tmp_path: Path) -> None:
-    """The device has its transmission type, time and mapping after the boot."""
+    """The device has its transmission type, time and mapping after the boot.
+
+    ``canopen dcf`` writes them and other values, and ``canopen diff`` compares them.
+    """
     (plain,) = load(tmp_path, {}).nodes
     changes = {'1800sub2': '1', '1800sub3': '50', '1A00sub0': '1', '1A00sub1': '0x60410010'}
-    (node,) = load(tmp_path, changes).nodes
+    config = load(tmp_path, changes | {'2000': '8'})
+    (node,) = config.nodes
     pdo = node.tpdos[0]
     assert (pdo.configured, pdo.transmission, pdo.inhibit_time) == (True, 1, 0.005)
     assert not node.tpdos[1].configured
-    store = booted(node, plain.dictionary).devices[NAME].store
-    assert store.read(0x1800, 2) == b'\x01'
-    assert store.read(0x1800, 3) == b'\x32\x00'
-    assert store.read(0x1A00, 0) == b'\x01'
-    assert store.read(0x1A00, 1) == b'\x10\x00\x41\x60'
+    store = booted(node, plain.dictionary)
+    found = [store.read(*place) for place in PLACES]
+    assert found == [b'\x01', b'\x32\x00', b'\x01', b'\x10\x00\x41\x60', b'\x08\x00']
+    places = [(write.index, write.subindex) for write in device_writes(config, node)]
+    assert (0x2000, 0) in places
+    assert places.index((0x1A00, 1)) < len(places) - 1 - places[::-1].index((0x1A00, 0))
+    assert {*PLACES} <= {(item.index, item.subindex) for item in expected_objects(config, node)}
 
 
 def test_a_value_that_the_device_refuses_names_the_dcf(tmp_path: Path) -> None:
-    """Whoever reads the message finds the file and the word to look for."""
+    """With the word to look for."""
     (plain,) = load(tmp_path, {}).nodes
     (node,) = load(tmp_path, {'2000': '8'}).nodes
     without = ObjectDictionary(entry for entry in plain.dictionary if entry.index != 0x2000)
@@ -301,17 +295,3 @@ def test_a_value_that_the_device_refuses_names_the_dcf(tmp_path: Path) -> None:
     net.start()
     net.run_until(lambda: bool(net.reported(Severity.WARNING)))
     assert 'ParameterValue of device.dcf' in net.reported(Severity.WARNING)[0]
-
-
-def test_the_other_tools_know_them_too(tmp_path: Path) -> None:
-    """``canopen dcf`` writes them, PDO mapping included, and ``canopen diff`` compares them."""
-    changes = {'2000': '8', '1A00sub0': '1', '1A00sub1': '0x60410010', '1800sub2': '1'}
-    config = load(tmp_path, changes)
-    (node,) = config.nodes
-    writes = device_writes(config, node)
-    places = [(write.index, write.subindex) for write in writes]
-    assert (0x2000, 0) in places
-    assert places.index((0x1A00, 1)) < len(places) - 1 - places[::-1].index((0x1A00, 0))
-    assert {(0x2000, 0), (0x1800, 2), (0x1A00, 1)} <= {
-        (item.index, item.subindex) for item in expected_objects(config, node)
-    }

@@ -75,40 +75,28 @@ def start() -> Iterator[Start]:
 def test_frames_are_shown_with_names_and_counted(
     start: Start, bus: Bus, name: str, tmp_path: Path
 ) -> None:
-    """With a bus.yml each frame has its device, its objects and their values."""
-    process = start(name, '--bus-config', str(write_bus(tmp_path)), '-n', '6', '-t', 'n')
+    """With a bus.yml each frame has its device, its objects and their values.
+
+    The parameters of the other nodes work here too.
+    """
+    config = write_bus(tmp_path)
+    ros = ['-p', f'can_interface_name:={name}', '-p', f'bus_config:={config}']
+    process = start('-n', '6', '-t', 'n', '--ros-args', *ros)
     for frame in FRAMES:
         bus.send(frame)
     output, errors = process.communicate(timeout=DEADLINE)
+    status = 'Statusword=0x1637 Operation enabled'
+    read = '0x6041:00 Statusword = 0x1637 Operation enabled'
     assert [line.rstrip() for line in output.splitlines()] == [
         '     000  [2]  01 02                    NMT        joint1     start',
         '     080  [0]                           SYNC',
-        (
-            '     182  [2]  37 16                    TPDO1      joint1     '
-            'Statusword=0x1637 Operation enabled'
-        ),
+        f'     182  [2]  37 16                    TPDO1      joint1     {status}',
         '     602  [8]  40 41 60 00 00 00 00 00  SDO >      joint1     read 0x6041:00 Statusword',
-        (
-            '     582  [8]  4B 41 60 00 37 16 00 00  SDO <      joint1     '
-            '0x6041:00 Statusword = 0x1637 Operation enabled'
-        ),
+        f'     582  [8]  4B 41 60 00 37 16 00 00  SDO <      joint1     {read}',
         '     702  [1]  05                       heartbeat  joint1     operational',
     ]
     assert errors == 'candump: 6 frames, 0 lost\n'
     assert process.returncode == 0
-
-
-def test_parameters_of_ros_name_bus_and_configuration(
-    start: Start, bus: Bus, name: str, tmp_path: Path
-) -> None:
-    """The parameters of the other nodes work here too."""
-    config = write_bus(tmp_path)
-    process = start(
-        '-n', '1', '--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={config}'
-    )
-    bus.send(Frame(0x702, b'\x00'))
-    output, _ = process.communicate(timeout=DEADLINE)
-    assert 'boot-up    joint1' in output
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -159,12 +147,15 @@ def test_a_log_is_shown_like_a_bus(suffix: str, capsys: Output, tmp_path: Path) 
     path = tmp_path / f'bus{suffix}'
     with closing(LogWriter(path, 'can0', 1.7e9)) as log:
         log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
-    code, out, _ = run_main(capsys, '--read', str(path), '-t', 'a', '--filter', '^sync', '-n', '2')
-    assert code == 0
-    assert [line[:30] for line in out.splitlines()] == [
-        '(1700000000.000000)      000  ',
-        '(1700000002.000000)      182  ',
-    ]
+    for style, terms, times in (
+        ('a', '^sync', ['1700000000.000000', '1700000002.000000']),
+        ('z', '182', ['0002.000000']),  # from its begin: two can be compared
+        ('d', '182', ['0000.000000']),  # since the line before of what is shown
+    ):
+        read = ['--read', str(path), '-t', style, '--filter', terms, '-n', '2']
+        code, out, _ = run_main(capsys, *read)
+        assert code == 0
+        assert [line.split()[0] for line in out.splitlines()] == [f'({time})' for time in times]
 
 
 def test_an_error_frame_of_a_log_has_the_long_identifier_of_a_live_one(
@@ -224,18 +215,6 @@ def test_a_log_is_converted(suffix: str, capsys: Output, tmp_path: Path) -> None
     assert source.read_text() == TWO_BUSES
 
 
-def test_filters_of_a_log_count_from_its_begin(capsys: Output, tmp_path: Path) -> None:
-    """Two of them can be compared; the time since the line before is that of what is shown."""
-    path = tmp_path / 'bus.log'
-    with closing(LogWriter(path, 'can0', 1.7e9)) as log:
-        log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
-    for style, first in (('z', '(0002.000000)'), ('d', '(0000.000000)')):
-        _, out, _ = run_main(
-            capsys, '--read', str(path), '-t', style, '--filter', '182', '-n', '1'
-        )
-        assert out.startswith(first), style
-
-
 def test_it_ends_after_its_time(capsys: Output) -> None:
     """--timeout ends it on a silent bus, with success."""
     code, out, err = run_main(capsys, free_virtual(), '--timeout', '0.01')
@@ -243,67 +222,45 @@ def test_it_ends_after_its_time(capsys: Output) -> None:
     assert err.endswith('candump: 0 frames, 0 lost\n')
 
 
-def test_quiet_prints_nothing_and_still_logs(capsys: Output, tmp_path: Path) -> None:
+def test_quiet_prints_nothing_and_still_logs(
+    start: Start, bus: Bus, name: str, tmp_path: Path
+) -> None:
     """With --quiet the log is all there is, and -n still ends it."""
-    name, log = free_virtual(), tmp_path / 'bus.log'
-
-    with open_bus(name) as sender:
-
-        class Impatient(candump.Listener):
-            """Sends when it listens, so that the frames are not too early."""
-
-            def __init__(self, bus: Bus, timeout: float) -> None:
-                super().__init__(bus, timeout)
-                for frame in FRAMES:
-                    sender.send(frame)
-
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(candump, 'Listener', Impatient)
-            code, out, _ = run_main(capsys, name, '-q', '--log', str(log), '-n', '6')
-    assert (code, out) == (0, '')
+    log = tmp_path / 'bus.log'
+    process = start(name, '-q', '--log', str(log), '-n', '6')
+    for frame in FRAMES:
+        bus.send(frame)
+    output, _ = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, output) == (0, '')
     assert unstamped(list(read_log(log))) == FRAMES
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'reason'),
-    [
-        (['udp_multicast:10.0.0.1'], 'no multicast address'),
-        (['paecan:x'], 'no interface paecan'),
-        (['--bus-config', 'nowhere/bus.yml'], 'nowhere/bus.yml'),
-        (['--read', 'nowhere.log'], 'nowhere.log'),
-        (['--read', str(REPOSITORY / 'LICENSE')], 'no log of a known format'),
-        (['udp_multicast:239.1.2.3', '--log', 'nowhere/bus.log'], 'nowhere/bus.log'),
-    ],
-)
-def test_what_cannot_be_opened_is_one_line(
-    capsys: Output, arguments: list[str], reason: str
-) -> None:
+def test_what_cannot_be_opened_is_one_line(capsys: Output) -> None:
     """A wrong bus or file ends it with exit code 1 and a sentence."""
-    code, out, err = run_main(capsys, *arguments)
-    assert (code, out) == (1, '')
-    assert err.startswith('candump: ')
-    assert reason in err
+    for command, reason in (
+        ('udp_multicast:10.0.0.1', 'no multicast address'),
+        ('paecan:x', 'no interface paecan'),
+        ('--bus-config nowhere/bus.yml', 'nowhere/bus.yml'),
+        ('--read nowhere.log', 'nowhere.log'),
+        (f'--read {REPOSITORY / "LICENSE"}', 'no log of a known format'),
+        ('udp_multicast:239.1.2.3 --log nowhere/bus.log', 'nowhere/bus.log'),
+    ):
+        code, out, err = run_main(capsys, *command.split())
+        assert (code, out) == (1, '')
+        assert err.startswith('candump: ')
+        assert reason in err
 
 
-@pytest.mark.parametrize(
-    'arguments',
-    [
-        ['--filter', 'nonsense'],
-        ['-n', '0'],
-        ['-n', 'x'],
-        ['--timeout', '0'],
-        ['--timeout', 'nan'],
-        ['-t', 'x'],
-        ['--ros-args', '-p', 'x'],
-        ['one', 'two'],
-    ],
-)
-def test_wrong_arguments_are_refused(capsys: Output, arguments: list[str]) -> None:
+def test_wrong_arguments_are_refused(capsys: Output) -> None:
     """Mistakes on the command line end with exit code 2, as everywhere."""
-    with pytest.raises(SystemExit) as ending:
-        candump.main(arguments)
-    assert ending.value.code == 2
-    assert 'usage: ' in capsys.readouterr().err
+    for command in (
+        *('--filter nonsense', '-n 0', '-n x', '--timeout 0', '--timeout nan', '-t x'),
+        *('--ros-args -p x', 'one two'),
+    ):
+        with pytest.raises(SystemExit) as ending:
+            candump.main(command.split())
+        assert ending.value.code == 2
+        assert 'usage: ' in capsys.readouterr().err
 
 
 def test_an_interface_that_goes_away_is_reported(

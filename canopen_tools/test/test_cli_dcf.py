@@ -11,13 +11,13 @@ import canopen
 from config_samples import load_text, write_bus
 from eds_samples import eds_text
 import pytest
-from tool_environment import REPOSITORY
+from tool_environment import Output, REPOSITORY
 
 from arm_canopen import BusConfig, load_bus
 from arm_canopen.config import SdoWrite
 from canopen_core.eds import load_eds
 from canopen_tools import lint_eds
-from canopen_tools.cli.dcf import device_writes, encode_concise, master_writes
+from canopen_tools.cli.dcf import device_writes, encode_concise
 from canopen_tools.cli.main import main
 from canopen_tools.cli.objects import expected_objects
 from canopen_tools.dcf_master import master_dcf
@@ -100,7 +100,7 @@ def writes_of(folder: Path, text: str = BUS, *, complete: bool = False) -> list[
     return [f'{w.index:04X}:{w.subindex:02X}={w.data.hex().upper()}' for w in writes]
 
 
-def test_golden_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_golden_bytes(tmp_path: Path, capsys: Output) -> None:
     """The files are where they are wanted, and named in the DCF of the master."""
     path, out = write_bus(tmp_path, BUS), tmp_path / 'new' / 'folder'
     assert main(['dcf', str(path), '--out', str(out), '-v']) == 0
@@ -113,66 +113,58 @@ def test_golden_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert lines[-1] == f'{out / "master.dcf"}: 1 device'
 
 
-def test_files_of_an_earlier_run_are_no_longer_there(tmp_path: Path) -> None:
-    """A device without anything to write has no file, also when it had one."""
-    start, end = BUS.index('  heartbeat_producer: 1000'), len(BUS)
-    plain = BUS[:start] + '  heartbeat_consumer: false\n'
+def test_files_of_an_earlier_run_are_no_longer_there(tmp_path: Path, capsys: Output) -> None:
+    """A device without anything to write has no file; a wrong bus.yml writes none."""
+    plain = BUS[: BUS.index('  heartbeat_producer: 1000')] + '  heartbeat_consumer: false\n'
     (tmp_path / 'joint1.bin').write_bytes(b'old')
     path = write_bus(tmp_path, plain)
-    assert end > start
-    assert main(['dcf', str(path), '--out', str(tmp_path), '--path', '/opt/arm']) == 0
+    dcf = ['dcf', str(path), '--path', '/opt/arm', '--out']
+    assert main([*dcf, str(tmp_path)]) == 0
     assert not (tmp_path / 'joint1.bin').exists()
     assert '[1F22]' not in (tmp_path / 'master.dcf').read_text()
     write_bus(tmp_path, BUS)
-    assert main(['dcf', str(path), '--out', str(tmp_path), '--path', '/opt/arm']) == 0
+    assert main([*dcf, str(tmp_path)]) == 0
     assert 'UploadFile=/opt/arm/joint1.bin\n' in (tmp_path / 'master.dcf').read_text()
-
-
-def test_a_wrong_bus_yml_writes_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Errors of the file are reported, exit code 1."""
-    path = write_bus(tmp_path, edited('node_id: 2', 'node_id: 200'))
-    assert main(['dcf', str(path), '--out', str(tmp_path / 'out')]) == 1
+    write_bus(tmp_path, edited('node_id: 2', 'node_id: 200'))
+    assert main([*dcf, str(tmp_path / 'out')]) == 1
     assert '200 is out of range' in capsys.readouterr().err
     assert not (tmp_path / 'out').exists()
+
+
+SECOND = 'transmission: 3\n      mapping: [{index: 0x607A}]'
+EQUAL = {'1017:00=0000', '1029:01=00', '1400:02=FF', '1801:03=0000'}
+"""What is as the EDS has it."""
 
 
 @pytest.mark.parametrize(
     ('old', 'new', 'present', 'absent'),
     [
-        ('heartbeat_producer: 1000', 'heartbeat_producer: 0', [], ['1017:00=0000']),
-        ('error_behavior: {1: 2}', 'error_behavior: {1: 0}', [], ['1029:01=00']),
-        ('heartbeat_consumer: true', 'heartbeat_consumer: false', [], ['1016:01=2C010100']),
-        ('transmission: 1', 'transmission: 255', [], ['1400:02=FF']),
-        ('inhibit_time: 50', 'inhibit_time: 0', [], ['1801:03=0000']),
-        ('inhibit_time: 50', 'event_timer: 20', ['1801:05=1400'], ['1801:03=3200']),
-        ('inhibit_time: 50', 'sync_start: 3', ['1801:06=03'], []),
-        ('transmission: 1', 'event_deadline: 30', ['1400:05=1E00'], []),
-        ('cob_id: auto', 'cob_id: 0x6A0', ['1801:01=A0060080', '1801:01=A0060000'], []),
-        ('    2:\n      enabled: false', '    2:\n      transmission: 3', ['1401:02=03'], []),
+        ('heartbeat_producer: 1000', 'heartbeat_producer: 0', '', '1017:00=0000'),
+        ('error_behavior: {1: 2}', 'error_behavior: {1: 0}', '', '1029:01=00'),
+        ('heartbeat_consumer: true', 'heartbeat_consumer: false', '', '1016:01=2C010100'),
+        ('transmission: 1', 'transmission: 255', '', '1400:02=FF'),
+        ('inhibit_time: 50', 'inhibit_time: 0', '', '1801:03=0000'),
+        ('inhibit_time: 50', 'event_timer: 20', '1801:05=1400', '1801:03=3200'),
+        ('inhibit_time: 50', 'sync_start: 3', '1801:06=03', '1801:03=3200'),
+        ('transmission: 1', 'event_deadline: 30', '1400:05=1E00', '1400:02=01'),
+        ('cob_id: auto', 'cob_id: 0x6A0', '1801:01=A0060080 1801:01=A0060000', '1801:02=01'),
+        ('    2:\n      enabled: false', f'    2:\n      {SECOND}', '1401:02=03', '1401:02=FF'),
     ],
 )
 def test_only_what_differs_from_the_eds_is_written(
-    tmp_path: Path, old: str, new: str, *, present: list[str], absent: list[str]
+    tmp_path: Path, old: str, new: str, *, present: str, absent: str
 ) -> None:
-    """As dcfgen does; the identifier is switched off and on around every change."""
+    """As dcfgen does; the identifier is switched off and on around every change.
+
+    All on request: a device that stores other values needs those that are equal, too.
+    """
     text = edited(old, new)
-    if old.startswith('    2:'):
-        text = text.replace('transmission: 3', 'transmission: 3\n      mapping: [{index: 0x607A}]')
-    writes = writes_of(tmp_path, text)
-    assert set(present) <= set(writes)
-    assert not set(absent) & set(writes)
-
-
-def test_everything_on_request(tmp_path: Path) -> None:
-    """A device that stores other values than its EDS needs those that are equal, too."""
-    text = edited('transmission: 1', 'transmission: 255').replace('{1: 2}', '{1: 0}')
-    text = text.replace('heartbeat_producer: 1000', 'heartbeat_producer: 0')
-    assert {'1400:02=FF', '1029:01=00', '1017:00=0000'} <= set(
-        writes_of(tmp_path, text, complete=True)
-    )
-    assert set(writes_of(tmp_path, text)) < set(writes_of(tmp_path, text, complete=True))
+    writes = set(writes_of(tmp_path, text))
+    assert set(present.split()) <= writes
+    assert absent not in writes
+    complete = set(writes_of(tmp_path, text, complete=True))
+    assert writes < complete
+    assert (absent in complete) is (absent in EQUAL)
 
 
 @pytest.mark.parametrize(
@@ -199,8 +191,13 @@ def test_an_entry_of_the_eds_is_the_masters_or_left_alone(
     assert (0x1016 in compared) is (first is not None)
 
 
-def test_data_of_any_length_are_written() -> None:
-    """A text, and nothing."""
+def test_expected_numbers_are_in_the_file_of_the_master(tmp_path: Path) -> None:
+    """Own serial number, and those that bus.yml names of devices; data of any length."""
+    text = edited('# master', 'serial_number: 0x77').replace('# joint1', 'revision_number: 3')
+    path = write_bus(tmp_path, text)
+    assert main(['dcf', str(path), '--out', str(tmp_path)]) == 0
+    golden = '02000000 1810 04 04000000 77000000 871F 02 04000000 03000000'
+    assert (tmp_path / 'master.bin').read_bytes() == bytes.fromhex(golden)
     writes = [SdoWrite(0x2001, 2, b'abcde'), SdoWrite(0x2002, 0, b'')]
     golden = '02000000 0120 02 05000000 6162636465 0220 00 00000000'
     assert encode_concise(writes) == bytes.fromhex(golden)
@@ -208,25 +205,11 @@ def test_data_of_any_length_are_written() -> None:
 
 def test_the_bit_rate_is_one_that_the_file_of_the_master_supports(tmp_path: Path) -> None:
     """Also 100 kbit/s, which EDS files have beside those of newer standards."""
-    config = load_text(tmp_path, edited('# master', 'baudrate: 100'))
-    text = master_dcf(config, {})
+    text = master_dcf(load_text(tmp_path, edited('# master', 'baudrate: 100')), {})
     assert '\nBaudrate=100\n' in text
     assert '\nBaudRate_100=1\n' in text
     config = load_text(tmp_path, edited('# master', 'baudrate: 125'))
     assert 'BaudRate_100=' not in master_dcf(config, {})  # dcf-tools 2.4.2 refuses it
-
-
-def test_expected_numbers_are_in_the_file_of_the_master(tmp_path: Path) -> None:
-    """Own serial number, and revision and serial numbers that bus.yml names."""
-    text = edited('# master', 'serial_number: 0x77').replace('# joint1', 'revision_number: 3')
-    config = load_text(tmp_path, text)
-    assert master_writes(config) == [
-        SdoWrite(0x1018, 4, b'\x77\0\0\0'),
-        SdoWrite(0x1F87, 2, b'\3\0\0\0'),
-    ]
-    assert main(['dcf', str(tmp_path / 'bus.yml'), '--out', str(tmp_path)]) == 0
-    golden = '02000000 1810 04 04000000 77000000 871F 02 04000000 03000000'
-    assert (tmp_path / 'master.bin').read_bytes() == bytes.fromhex(golden)
 
 
 class MasterFile:
@@ -259,6 +242,13 @@ SETTINGS = """\
   error_behavior: {1: 1, 2: 2}
   time_cob_id: 0x40000100
 """
+OF_MASTER = {
+    (0x1005, 0): 0x4000_0080, (0x1006, 0): 10_000, (0x1007, 0): 5000, (0x1012, 0): 0x4000_0100,
+    (0x1014, 0): 0x81, (0x1015, 0): 100, (0x1016, 1): 2 << 16 | 3000, (0x1017, 0): 100,
+    (0x1018, 1): 0x360, (0x1018, 2): 7, (0x1019, 0): 10, (0x1028, 1): 0x8000_0000,
+    (0x1029, 1): 1, (0x1029, 2): 2, (0x102A, 0): 20, (0x1F80, 0): 0x0B, (0x1F81, 2): 0x0000_041D,
+    (0x1F84, 2): 0x20192, (0x1F85, 2): 0x555, (0x1F86, 2): 7, (0x1F89, 0): 4000,
+}  # fmt: skip
 
 
 def test_the_master_as_lely_wants_it(tmp_path: Path) -> None:
@@ -266,30 +256,7 @@ def test_the_master_as_lely_wants_it(tmp_path: Path) -> None:
     keys = '  mandatory: true\n  reset_communication: false\n  retry_factor: 4'
     text = edited('  # master\n', SETTINGS).replace('  # joint1', keys)
     file = MasterFile(tmp_path, load_text(tmp_path, text))
-    for index, subindex, value in (
-        (0x1005, 0, 0x4000_0080),
-        (0x1006, 0, 10_000),
-        (0x1007, 0, 5000),
-        (0x1012, 0, 0x4000_0100),
-        (0x1014, 0, 0x81),
-        (0x1015, 0, 100),
-        (0x1016, 1, 2 << 16 | 3000),
-        (0x1017, 0, 100),
-        (0x1018, 1, 0x360),
-        (0x1018, 2, 7),
-        (0x1019, 0, 10),
-        (0x1028, 1, 0x8000_0000),
-        (0x1029, 1, 1),
-        (0x1029, 2, 2),
-        (0x102A, 0, 20),
-        (0x1F80, 0, 0x0B),
-        (0x1F81, 2, 0x0000_041D),
-        (0x1F84, 2, 0x20192),
-        (0x1F85, 2, 0x555),
-        (0x1F86, 2, 7),
-        (0x1F89, 0, 4000),
-    ):
-        assert file.value(index, subindex) == value, f'{index:04X}:{subindex:02X}'
+    assert {place: file.value(*place) for place in OF_MASTER} == OF_MASTER
 
 
 def test_pdos_are_mirrored(tmp_path: Path) -> None:
