@@ -71,16 +71,12 @@ def send_raw(name: str, datagram: bytes) -> None:
         sender.sendto(datagram, (group, int(port)))
 
 
-def test_python_can_receives_ours(bus: Bus, peer: can.BusABC) -> None:
-    """python-can's bus reads what ours sends, in order."""
+def test_python_can_and_we_receive_each_other(bus: Bus, peer: can.BusABC) -> None:
+    """What one side sends the other reads, in order and once."""
     for frame in FRAMES:
         bus.send(frame)
     messages = [peer.recv(DEADLINE) for _ in FRAMES]
     assert [from_message(message, 0.0) for message in messages if message] == FRAMES
-
-
-def test_we_receive_python_can(bus: Bus, peer: can.BusABC) -> None:
-    """Our bus reads what python-can's sends, in order and once."""
     for frame in FRAMES:
         peer.send(to_message(frame))
     assert unstamped(receive_count(bus, len(FRAMES))) == FRAMES
