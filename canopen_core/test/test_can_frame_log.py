@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import closing
 import io
 from pathlib import Path
-import re
 import shutil
 import subprocess
 import tempfile
@@ -288,18 +287,6 @@ def test_a_pause_between_two_clocks_does_not_move_a_log(monkeypatch: pytest.Monk
     monkeypatch.setattr(bus, 'monotonic', steady)
     monkeypatch.setattr(bus, 'time', lambda: now[0] + next(pauses, 0.0) + 1.7e9)
     assert bus.wall_clock_offset() == pytest.approx(1.7e9, abs=1e-3)
-
-
-@pytest.mark.skipif(shutil.which('tshark') is None, reason='needs tshark, of Wireshark')
-def test_wireshark_reads_our_logs_as_canopen(tmp_path: Path) -> None:
-    """With the dissector that is chosen as the README says."""
-    read = Frame(0x605, bytes.fromhex('4041600000000000'), 1.5)
-    path = written([read, Frame(0x705, b'\x05', 2.0)], tmp_path)
-    command = ['tshark', '-r', str(path), '-t', 'e', '-d', 'can.subdissector,canopen']
-    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    first, second = shown.splitlines()
-    assert re.search(r'1700000001\.500000 .*CANopen.*SDO.*Initiate upload request', first)
-    assert re.search(r'CANopen.*Operational', second)
 
 
 @given(st.lists(frames(), max_size=20))

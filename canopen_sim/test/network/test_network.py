@@ -913,14 +913,14 @@ def test_a_command_that_the_bus_refuses_leaves_as_soon_as_the_bus_takes_it(
     net.boot()
     net.run(0.5)
     net.wire.refuses = 'the transmit queue is full'
-    stop, start = (net.network.send_nmt(c, 2) for c in (NmtCommand.STOP, NmtCommand.START))
+    commands = [NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.START]
+    sent = [net.network.send_nmt(command, 2) for command in commands]
     net.run(0.2)
-    assert not stop.done
+    assert not sent[0].done
     assert net.network.nodes['joint2'].wanted is NmtState.OPERATIONAL
     net.wire.refuses = ''
-    net.result(start)
-    last_two = [sent.frame.data[0] for sent in nmt_commands(net)[-2:]]
-    assert last_two == [NmtCommand.STOP, NmtCommand.START]
+    net.result(sent[-1])
+    assert [sent.frame.data[0] for sent in nmt_commands(net)[-3:]] == commands
     before = len(nmt_commands(net))
     net.wire.refuses = 'the transmit queue is full'
     with pytest.raises(BusError, match='NMT STOP to node 2 was not sent: the transmit queue is'):
@@ -985,15 +985,6 @@ def test_devices_and_tools_are_no_master() -> None:
         assert bus.counters.received >= len(frames)
 
 
-def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
-    """What waited in the interface before the listening began is ignored."""
-    wire = VirtualWire()
-    with VirtualBus('here', wire) as bus, VirtualBus('there', wire) as ended:
-        for _ in range(20):
-            ended.send(Frame(0x080))
-        assert not listen(bus, BUS, monotonic)
-
-
 class SlowBus(VirtualBus):
     """A bus of which each frame takes a time in [s] to be read; the last one comes for ever."""
 
@@ -1012,21 +1003,31 @@ class SlowBus(VirtualBus):
 
 
 UNREAD = Frame(0x182, bytes(3), timestamp=9.0)
+OLDER = [Frame(0x182, bytes(3), timestamp=5.0 + number) for number in range(3)]
+FRESH = Frame(0x080, timestamp=10.1)
 
 
-@pytest.mark.parametrize('last', [None, UNREAD], ids=['read', 'endless'])
-def test_a_master_is_found_behind_all_that_waits_to_be_read(last: Frame | None) -> None:
-    """However long that takes, and also where the rest stays unread."""
-    frames = [Frame(0x182, bytes(3), timestamp=5.0 + number) for number in range(3)]
-    bus = SlowBus(*frames, Frame(0x080, timestamp=10.1), last, step=1.5 * LISTENING_TIME)
+@pytest.mark.parametrize(
+    ('frames', 'found'),
+    [([*OLDER, FRESH, None], 1), ([*OLDER, FRESH, UNREAD], 1), ([Frame(0x080, timestamp=9.0)], 0)],
+    ids=['read to its end', 'endless', 'last words of one that has ended'],
+)
+def test_a_master_is_found_behind_all_that_waits_to_be_read(
+    frames: list[Frame | None], found: int
+) -> None:
+    """However long that takes, and also where the rest stays unread; what is older is ignored."""
+    bus = SlowBus(*frames, *([] if found else [None]), step=1.5 * LISTENING_TIME)
     with bus:
-        assert listen(bus, BUS, lambda: bus.now).total() == 1
+        assert listen(bus, BUS, lambda: bus.now).total() == found
 
 
 @pytest.mark.parametrize('frame', [Frame(0x080), UNREAD], ids=['no time stamp', 'old'])
 @pytest.mark.parametrize('step', [0.01, 2.0 * CATCH_UP_MAX])
 def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, step: float) -> None:
-    """A limited time is given to it; whether there is a master is not known then."""
+    """A limited time is given to it; whether there is a master is not known then.
+
+    Beside another master it is led all the same, and what is not known is reported.
+    """
     bus = SlowBus(frame, step=step)
     with bus:
         with pytest.raises(OtherMasterError, match='another master is on here is not known') as no:
@@ -1035,33 +1036,10 @@ def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, ste
         assert bus.now < 10.0 + LISTENING_TIME + CATCH_UP_MAX + 2.0 * step + 0.1
     assert 'Nothing was sent' in str(no.value)
     assert 'beside_master:=true' in str(no.value)
-
-
-def test_beside_another_master_a_bus_that_is_not_read_to_its_end_is_reported() -> None:
-    """It is led all the same, and what is not known is reported."""
-    bus = SlowBus(UNREAD)
-    with bus:
+    with SlowBus(frame, step=step) as bus:
         clock = Clock(lambda: bus.now, Future)
         master = CanopenMaster(BUS, bus, beside_master=True, clock=clock)
         assert 'another master is on here is not known' in master.listen()
-
-
-def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
-    """Whatever moment one looks at a running master, it is detected."""
-    net = VirtualNetwork(BUS)
-    net.boot()
-    net.run(1.0)
-    signs = MasterFrames(BUS)
-    for number in range(20):
-        begin = net.now + number * 0.0013
-        net.run(LISTENING_TIME + 0.03)
-        frames = [
-            sent.frame
-            for sent in net.wire.log
-            if sent.sender == 'master' and begin <= sent.time < begin + LISTENING_TIME
-        ]
-        assert any(signs.read(frame) for frame in frames)
-        assert not any(signs.read(sent.frame) for sent in net.wire.log if sent.sender != 'master')
 
 
 def test_beside_another_master_no_command_is_for_all() -> None:

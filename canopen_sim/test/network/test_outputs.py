@@ -21,7 +21,7 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import BusError, CodecError, NodeConfig, OperationMode
-from arm_canopen.config import check_bus, PdoConfig, RPDO
+from arm_canopen.config import PdoConfig, RPDO
 from canopen_core.can import Frame
 from canopen_core.standard import (
     AccessType,
@@ -141,16 +141,6 @@ def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
     net.run_until(net.all_ready, 5.0)
     (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
     assert at == round(net.drives['a'].view.position * SCALE)
-
-
-def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:
-    """The targets of modes 7 and 8 both start where the drive is."""
-    net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
-    net.boot()
-    (configured,) = (sent.time for sent in net.wire.log if sent.frame.data == b'\x80\x02')
-    requests = net.frames(0x602, since=configured)
-    begun = [data for data in requests if data[:4] == b'\x40\x64\x60\0']
-    assert len(begun) == 1
 
 
 @pytest.mark.parametrize('index', [0x207A, 0x20B0])
@@ -306,11 +296,3 @@ def test_a_deadline_is_kept_once_something_was_published() -> None:
     gaps = [later - time for time, later in zip([begin, *times], times, strict=False)]
     assert len(times) > 10
     assert max(gaps) < 0.1
-
-
-def test_check_counts_no_frames_that_nobody_sends() -> None:
-    """The load of the bus has the RPDOs of the module at rate 0."""
-    load = check_bus(bus_config(module())).load
-    assert load is not None
-    rates = {item.service: item.rate for item in load.traffic}
-    assert rates['RPDO 1'] == rates['RPDO 2'] == 0.0

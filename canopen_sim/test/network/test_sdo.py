@@ -7,7 +7,6 @@ from __future__ import annotations
 from binascii import crc_hqx
 from collections.abc import Callable
 from functools import partial
-import gc
 import random
 from typing import Any
 
@@ -451,19 +450,6 @@ def test_no_frames_whatever_break_the_client(garbage: list[bytes]) -> None:
     line.serve(SdoByteServer(values={(0x1018, 1): b'\x2a'}).answer)
     assert again.result() == b'\x2a'
     assert line.defects == []
-
-
-def test_transfers_that_a_master_leaves_in_the_queue_are_no_lost_coroutines(
-    recwarn: pytest.WarningsRecorder,
-) -> None:
-    """It ends with them, and Python finds nothing to warn of."""
-    line = Line()
-    for number in range(3):
-        line.client.write(0x2000 + number, 0, b'1', TIMEOUT)
-        line.client.read(0x2000 + number, 0, TIMEOUT)
-    del line
-    gc.collect()
-    assert [str(warning.message) for warning in recwarn] == []
 
 
 class BlockLine:
