@@ -62,39 +62,33 @@ def opened_with(monkeypatch: pytest.MonkeyPatch, messages: list[can.Message]) ->
     return options
 
 
-@pytest.mark.parametrize(
-    ('name', 'channel', 'bitrate'),
-    [
-        ('pcan:PCAN_USBBUS1@500000', 'PCAN_USBBUS1', 500_000),
-        ('slcan:/dev/ttyUSB0@1000000', '/dev/ttyUSB0', 1_000_000),
-        ('kvaser:0', '0', None),
-        ('socketcand:can0:localhost:29536', 'can0:localhost:29536', None),
-        ('slcan:user@host@125000', 'user@host', 125_000),
-    ],
-)
-def test_a_name_is_interface_channel_and_bit_rate(
-    opened_with: dict[str, object], name: str, channel: str, bitrate: int | None
-) -> None:
+def test_a_name_is_interface_channel_and_bit_rate(opened_with: dict[str, object]) -> None:
     """The parts of the name reach the driver, own messages are not requested."""
-    with open_bus(name) as bus:
-        assert bus.name == name
-    found = {key: opened_with.get(key) for key in ('interface', 'channel', 'bitrate')}
-    assert found == {'interface': name.partition(':')[0], 'channel': channel, 'bitrate': bitrate}
-    assert opened_with['receive_own_messages'] is False
+    for kind, channel, bitrate in (
+        ('pcan', 'PCAN_USBBUS1', 500_000),
+        ('slcan', '/dev/ttyUSB0', 1_000_000),
+        ('kvaser', '0', None),
+        ('socketcand', 'can0:localhost:29536', None),
+        ('slcan', 'user@host', 125_000),
+    ):
+        name = f'{kind}:{channel}@{bitrate}' if bitrate else f'{kind}:{channel}'
+        opened_with.clear()
+        with open_bus(name) as bus:
+            assert bus.name == name
+        found = [opened_with.get(key) for key in ('interface', 'channel', 'bitrate')]
+        assert found == [kind, channel, bitrate]
+        assert opened_with['receive_own_messages'] is False
 
 
-@pytest.mark.parametrize(
-    ('name', 'reason'),
-    [
+def test_what_cannot_be_opened_says_why() -> None:
+    """A wrong bit rate, an unknown interface, or the driver's own reason."""
+    for name, reason in (
         *((f'pcan:X@{rate}', 'no bit rate') for rate in ('', 'fast', '0', '-1')),
         ('paecan:PCAN_USBBUS1', r'no interface paecan; it has .*pcan'),
         ('slcan:/nowhere/tty@500000', 'cannot open slcan:/nowhere/tty'),
-    ],
-)
-def test_what_cannot_be_opened_says_why(name: str, reason: str) -> None:
-    """A wrong bit rate, an unknown interface, or the driver's own reason."""
-    with pytest.raises(BusError, match=reason):
-        open_bus(name)
+    ):
+        with pytest.raises(BusError, match=reason):
+            open_bus(name)
 
 
 def _message(**fields: object) -> can.Message:

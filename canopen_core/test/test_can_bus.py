@@ -309,11 +309,11 @@ def test_users_and_domains_have_buses_of_their_own(
         assert f'auto is {bus.name}' in caplog.text
 
 
-@pytest.mark.parametrize('name', ['', ':', ':x', 'virtual:', 'pcan:'])
-def test_names_of_nothing_are_refused(name: str) -> None:
+def test_names_of_nothing_are_refused() -> None:
     """An empty kind or channel names no bus, and the message says what would."""
-    with pytest.raises(BusError, match='take can0, vcan0, udp_multicast or auto'):
-        open_bus(name)
+    for name in ('', ':', ':x', 'virtual:', 'pcan:'):
+        with pytest.raises(BusError, match='take can0, vcan0, udp_multicast or auto'):
+            open_bus(name)
 
 
 def test_virtual_buses_of_different_names_do_not_meet() -> None:

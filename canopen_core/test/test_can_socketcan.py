@@ -49,50 +49,37 @@ def test_the_layout_is_the_kernels() -> None:
         pack(read)
 
 
-@pytest.mark.parametrize(
-    ('name', 'said'),
-    [
+def test_a_missing_interface_names_what_exists_and_how_to_make_it() -> None:
+    """For virtual and real ones; a slip is no fault of the kernel, and no cable is missing."""
+    there = {'can_arm': CanInterface('can_arm', True, 1000)}
+    for name, words in (
         ('vcan0', 'this host has: can_arm'),
         ('vcan0', 'ip link add dev vcan0 type vcan'),
         ('can0', 'ip link set up can0 type can bitrate'),
-        *(
-            (slip, f"no bus is called '{slip}' (is '{meant}' meant?)")
-            for slip, meant in (
-                ('cna0', 'can0'),
-                ('vcna0', 'vcan0'),
-                ('udp_multicats', 'udp_multicast'),
-                ('ato', 'auto'),
-                ('can_amr', 'can_arm'),
-            )
-        ),
-    ],
-)
-def test_a_missing_interface_names_what_exists_and_how_to_make_it(name: str, said: str) -> None:
-    """For virtual and real ones; a slip is no fault of the kernel, and no cable is missing."""
-    text = missing_interface_text(name, {'can_arm': CanInterface('can_arm', True, 1000)})
-    assert said in text
-    if 'meant' in said:
+    ):
+        assert words in missing_interface_text(name, there)
+    slips = {'cna0': 'can0', 'vcna0': 'vcan0', 'udp_multicats': 'udp_multicast', 'ato': 'auto'}
+    for slip, meant in (slips | {'can_amr': 'can_arm'}).items():
+        text = missing_interface_text(slip, there)
+        assert f"no bus is called '{slip}' (is '{meant}' meant?)" in text
         assert 'CAN interfaces of this host: can_arm; other buses: udp_multicast' in text
         assert 'plug' not in text
     assert 'this host has: none' in missing_interface_text('can0', {})
 
 
-@pytest.mark.parametrize(
-    ('code', 'remedy'),
-    [
+def test_failures_of_the_interface_name_the_remedy() -> None:
+    """Each error number of the kernel becomes a sentence a person can act on."""
+    for code, remedy in (
         (errno.ENETDOWN, 'ip link set up can0'),
         (errno.ENOBUFS, 'txqueuelen 1000'),
         (errno.EAGAIN, 'no device acknowledges'),
         (errno.ENODEV, 'plug the adapter in'),
         (errno.ENXIO, 'reopen the bus'),
         (errno.EPERM, 'not permitted'),
-    ],
-)
-def test_failures_of_the_interface_name_the_remedy(code: int, remedy: str) -> None:
-    """Each error number of the kernel becomes a sentence a person can act on."""
-    text = failure_text('can0', OSError(code, os.strerror(code)))
-    assert 'can0' in text
-    assert remedy in text
+    ):
+        text = failure_text('can0', OSError(code, os.strerror(code)))
+        assert 'can0' in text
+        assert remedy in text
 
 
 def test_a_kernel_without_can_names_the_multicast_bus(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,9 +249,9 @@ def test_a_missing_interface_is_refused_where_the_kernel_has_can(vcan: str) -> N
         open_bus('can99')
 
 
-@pytest.mark.parametrize(
-    ('can_id', 'data', 'text'),
-    [
+def test_classes_and_details_are_named() -> None:
+    """What the controller reports is reported as linux/can/error.h defines it."""
+    for can_id, data, text in (
         (0x040, bytes(8), 'bus off'),
         (0x020, bytes(8), 'no acknowledge'),
         (0x004, b'', 'controller problem'),
@@ -272,11 +259,8 @@ def test_a_missing_interface_is_refused_where_the_kernel_has_can(vcan: str) -> N
         (0x088, b'\0\0\x84', 'protocol violation (bit stuffing, on transmission), bus error'),
         (0x240, bytes(6) + b'\x80\x05', 'bus off, 128 transmit and 5 receive errors counted'),
         (0x1000, bytes(8), 'error class 0x1000'),
-    ],
-)
-def test_classes_and_details_are_named(can_id: int, data: bytes, text: str) -> None:
-    """What the controller reports is reported as linux/can/error.h defines it."""
-    assert error_text(Frame(can_id, data, is_error=True)) == text
+    ):
+        assert error_text(Frame(can_id, data, is_error=True)) == text
 
 
 @given(st.integers(0, 0x1FFF_FFFF), st.binary(max_size=8))

@@ -119,16 +119,14 @@ ODDITIES: list[tuple[str, int, str]] = [
 ]
 
 
-@pytest.mark.parametrize(('text', 'line', 'message'), ODDITIES)
-def test_oddities_are_warnings_with_their_line(
-    tmp_path: Path, text: str, line: int, message: str
-) -> None:
+def test_oddities_are_warnings_with_their_line(tmp_path: Path) -> None:
     """What is wrong is reported with its line, and the rest of the file is read."""
-    lines = [*text.split('|'), '[1000]', 'DataType=7', 'AccessType=ro']
-    eds = read(tmp_path, '\n'.join(lines))
-    assert (0x1000, 0) in eds.dictionary
-    found = [problem for problem in eds.warnings if problem.line == line]
-    assert any(re.search(message, problem.message) for problem in found), eds.warnings
+    for text, line, message in ODDITIES:
+        lines = [*text.split('|'), '[1000]', 'DataType=7', 'AccessType=ro']
+        eds = read(tmp_path, '\n'.join(lines))
+        assert (0x1000, 0) in eds.dictionary, text
+        found = [problem for problem in eds.warnings if problem.line == line]
+        assert any(re.search(message, problem.message) for problem in found), (text, eds.warnings)
 
 
 ARRAY = f'[2000]|ObjectType=8|{NUMBER}|DefaultValue=7|CompactSubObj=3'
@@ -205,20 +203,17 @@ def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
     assert names == ['NrOfObjects', 'Field1', 'Second']
 
 
-@pytest.mark.parametrize(
-    ('section', 'node_id'),
-    [
+def test_the_node_id_of_a_dcf(tmp_path: Path) -> None:
+    """A DCF gives the node id, under either spelling; an invalid one does not count."""
+    for section, node_id in (
         ('[DeviceComissioning]\nNodeID=0x05', 5),
         ('[DeviceCommissioning]\nNodeID=7', 7),
         ('[DeviceComissioning]\nNodeID=', None),
         ('[DeviceComissioning]\nNodeID=200', None),
         ('', None),
-    ],
-)
-def test_the_node_id_of_a_dcf(tmp_path: Path, section: str, node_id: int | None) -> None:
-    """A DCF gives the node id, under either spelling; an invalid one does not count."""
-    eds = read(tmp_path, f'{section}\n[1000]\nDataType=7\nAccessType=ro')
-    assert eds.node_id == node_id
+    ):
+        eds = read(tmp_path, f'{section}\n[1000]\nDataType=7\nAccessType=ro')
+        assert eds.node_id == node_id, section
 
 
 def test_dummy_usage(tmp_path: Path) -> None:
@@ -229,23 +224,17 @@ def test_dummy_usage(tmp_path: Path) -> None:
     assert read(tmp_path, text + objects).dummy_types == {5, 7}
 
 
-@pytest.mark.parametrize(
-    ('content', 'message'),
-    [(None, 'no such file'), (b'', 'no object'), (b'\x7fELF\0\0\xff\xfe', 'no object')],
-    ids=['missing', 'empty', 'binary'],
-)
-def test_files_that_are_no_eds_are_refused(
-    tmp_path: Path, content: bytes | None, message: str
-) -> None:
+def test_files_that_are_no_eds_are_refused(tmp_path: Path) -> None:
     """A missing, empty or binary file or a folder is one error with the path and a remedy."""
-    path = tmp_path / 'x.eds'
-    if content is not None:
-        path.write_bytes(content)
-    for each in (path, tmp_path) if content is None else (path,):
+    empty, binary = tmp_path / 'empty.eds', tmp_path / 'binary.eds'
+    empty.write_bytes(b'')
+    binary.write_bytes(b'\x7fELF\0\0\xff\xfe')
+    missing = {tmp_path / 'x.eds': 'no such file', tmp_path: 'no such file'}
+    for path, message in (missing | {empty: 'no object', binary: 'no object'}).items():
         with pytest.raises(ConfigError, match=message) as caught:
-            load_eds(each)
+            load_eds(path)
         (problem,) = caught.value.problems
-        assert problem.file == each
+        assert problem.file == path
         assert problem.remedy
 
 
@@ -425,9 +414,9 @@ def test_bytes_and_strings_come_back(data_type: DataType, raw: bytes, string: st
     assert text_from_bytes(DataType.VISIBLE_STRING, encoded) == string
 
 
-@pytest.mark.parametrize(
-    ('data_type', 'text', 'message'),
-    [
+def test_what_is_no_value_is_refused() -> None:
+    """The reason names the text or the type."""
+    for data_type, text, message in (
         (DataType.UNSIGNED8, '256', 'does not fit UNSIGNED8'),
         (DataType.INTEGER8, '-129', 'does not fit INTEGER8'),
         (DataType.INTEGER16, '', 'no INTEGER16'),
@@ -441,10 +430,6 @@ def test_bytes_and_strings_come_back(data_type: DataType, raw: bytes, string: st
         (DataType.DOMAIN, 'xyz', 'non-hexadecimal'),
         (DataType.TIME_OF_DAY, '00 01', 'TIME_OF_DAY'),
         (DataType.VISIBLE_STRING, '\u20ac', 'VISIBLE_STRING'),
-    ],
-    ids=str,
-)
-def test_what_is_no_value_is_refused(data_type: DataType, text: str, message: str) -> None:
-    """The reason names the text or the type."""
-    with pytest.raises(CodecError, match=message):
-        bytes_from_text(data_type, text)
+    ):
+        with pytest.raises(CodecError, match=message):
+            bytes_from_text(data_type, text)

@@ -117,9 +117,9 @@ def test_predefined_identifiers_never_collide() -> None:
             default(number, 1)
 
 
-@pytest.mark.parametrize(
-    ('address', 'literal', 'file_node_id', 'cob_id'),
-    [
+def test_a_cob_id_of_another_node_id_is_that_of_the_device() -> None:
+    """Where the file leaves out ``$NODEID``; what it means is kept, and so is the value itself."""
+    for address, literal, file_node_id, cob_id in (
         ((0x1014, 0), 0x80, None, 0x83),
         ((0x1014, 0), 0, None, 0x83),
         ((0x1014, 0), 0x91, None, 0x83),
@@ -133,16 +133,11 @@ def test_predefined_identifiers_never_collide() -> None:
         ((0x1804, 1), 0x685, None, 0x685),  # no pre-defined one
         ((0x1800, 1), 0x2000_0185, None, 0x2000_0185),
         ((0x2000, 0), 0x185, None, 0x185),
-    ],
-)
-def test_a_cob_id_of_another_node_id_is_that_of_the_device(
-    address: tuple[int, int], literal: int, file_node_id: int | None, cob_id: int
-) -> None:
-    """Where the file leaves out ``$NODEID``; what it means is kept, and so is the value itself."""
-    written = ObjectEntry(*address, 'COB-ID', DataType.UNSIGNED32, default=literal)
-    (entry,) = ObjectDictionary([written], node_id=file_node_id).for_node(3)
-    assert entry.default == cob_id
-    assert entry.literal == (None if cob_id == literal else literal)
+    ):
+        written = ObjectEntry(*address, 'COB-ID', DataType.UNSIGNED32, default=literal)
+        (entry,) = ObjectDictionary([written], node_id=file_node_id).for_node(3)
+        assert entry.default == cob_id, (address, hex(literal), file_node_id)
+        assert entry.literal == (None if cob_id == literal else literal)
 
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
@@ -191,9 +186,9 @@ def test_names_may_be_shortened(dictionary: ObjectDictionary) -> None:
         assert find_object(dictionary, path).address == address
 
 
-@pytest.mark.parametrize(
-    ('path', 'words'),
-    [
+def test_what_is_not_found_is_answered_with_what_there_is(dictionary: ObjectDictionary) -> None:
+    """The message helps to write it rightly."""
+    for path, words in (
         ('  status  word ', 'similar: 0x6041:00 Statusword'),
         ('Contrlword', 'no object .*similar: 0x6040:00 Controlword'),
         ('position', 'may be any of .*0x6064:00 Position actual value'),
@@ -201,15 +196,9 @@ def test_names_may_be_shortened(dictionary: ObjectDictionary) -> None:
         ('0x9999', 'no object 0x9999 in .*cia402_drive.eds'),
         ('', 'no object is named'),
         (' / ', 'no object is named'),
-    ],
-    ids=['blanks', 'misspelt', 'several', 'sub-index', 'index', 'empty', 'slash'],
-)
-def test_what_is_not_found_is_answered_with_what_there_is(
-    dictionary: ObjectDictionary, path: str, words: str
-) -> None:
-    """The message helps to write it rightly."""
-    with pytest.raises(ObjectError, match=words):
-        find_object(dictionary, path)
+    ):
+        with pytest.raises(ObjectError, match=words):
+            find_object(dictionary, path)
 
 
 INTEGERS = [*SIGNED_BITS, *UNSIGNED_BITS]
