@@ -126,22 +126,6 @@ def test_what_an_output_cannot_hold_is_refused(net: VirtualNetwork, io: CanopenD
     assert net.frames(DIGITAL) == net.frames(ANALOG) == []
 
 
-def test_what_was_commanded_before_a_boot_does_not_come_back(
-    net: VirtualNetwork, io: CanopenDevice
-) -> None:
-    """The module has booted with its outputs off, and another output is written."""
-    io.write('Digital outputs 2', 0xFF)
-    net.run(0.2)
-    net.power_off('io')
-    net.run(3.0)
-    net.power_on('io')
-    net.run(3.0)
-    io.write(OUTPUT, 1)
-    net.run(0.2)
-    store = net.devices['io'].store
-    assert [store.find(0x6200, number).value for number in (1, 2)] == [1, 0]
-
-
 def test_each_request_has_its_own_time_out(net: VirtualNetwork, io: CanopenDevice) -> None:
     """One that a slow object needs, or one that a program can afford."""
     net.devices['io'].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.5), net.now)
@@ -221,19 +205,14 @@ def test_check_names_what_the_topics_would_lack(
     assert warning.remedy
 
 
-@pytest.mark.parametrize(
-    ('keys', 'position', 'velocity'),
-    [
+def test_the_scale_of_an_encoder(tmp_path: Path) -> None:
+    """Of bus.yml, else radians by the units per revolution that it has after the boot."""
+    for keys, position, velocity in (
         ('', math.tau / 4096, math.tau / 4096),
         ('sdo: [{index: 0x6001, value: 1000}]', math.tau / 1000, math.tau / 1000),
         ('scale_pos_from_dev: 0.5', 0.5, 0.5),
         ('scale_vel_from_dev: 0.25', math.tau / 4096, 0.25),
-    ],
-)
-def test_the_scale_of_an_encoder(
-    tmp_path: Path, keys: str, position: float, velocity: float
-) -> None:
-    """Of bus.yml, else radians by the units per revolution that it has after the boot."""
-    axis = edited(tmp_path, ENCODER, f'{ENCODER}\n    {keys}').node('encoder').drive
-    assert axis.scale_pos_from_dev == pytest.approx(position)
-    assert axis.scale_vel_from_dev == pytest.approx(velocity)
+    ):
+        axis = edited(tmp_path, ENCODER, f'{ENCODER}\n    {keys}').node('encoder').drive
+        assert axis.scale_pos_from_dev == pytest.approx(position), keys
+        assert axis.scale_vel_from_dev == pytest.approx(velocity), keys

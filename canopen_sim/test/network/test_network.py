@@ -1036,9 +1036,10 @@ def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, ste
         assert bus.now < 10.0 + LISTENING_TIME + CATCH_UP_MAX + 2.0 * step + 0.1
     assert 'Nothing was sent' in str(no.value)
     assert 'beside_master:=true' in str(no.value)
-    with SlowBus(frame, step=step) as bus:
-        clock = Clock(lambda: bus.now, Future)
-        master = CanopenMaster(BUS, bus, beside_master=True, clock=clock)
+    beside = SlowBus(frame, step=step)
+    with beside:
+        clock = Clock(lambda: beside.now, Future)
+        master = CanopenMaster(BUS, beside, beside_master=True, clock=clock)
         assert 'another master is on here is not known' in master.listen()
 
 

@@ -109,23 +109,20 @@ def test_any_value_survives_a_round_trip(
     assert back.result() == (value.ljust(4, b'\0') if unknown_length else value)
 
 
-@pytest.mark.parametrize(
-    ('answer', 'words'),
-    [
+def test_a_refusal_is_said_with_place_and_meaning() -> None:
+    """An abort names the device, the object and the code in words, and keeps the code."""
+    for answer, words in (
         ('80 18 10 01 00 00 02 06', 'refused object 0x1018:01: object does not exist'),
         ('80 00 00 00 00 00 02 06', 'object does not exist'),  # some leave the object out
         ('80 18 10 01 EF BE AD DE', '0xDEADBEEF'),  # of a vendor
-    ],
-)
-def test_a_refusal_is_said_with_place_and_meaning(answer: str, words: str) -> None:
-    """An abort names the device, the object and the code in words, and keeps the code."""
-    line = Line()
-    promise = read(line)
-    line.receive(answer)
-    with pytest.raises(SdoAbortError, match=rf'joint1 \(node 5\) .*{words}') as caught:
-        promise.result()
-    assert caught.value.code == int.from_bytes(bytes.fromhex(answer)[4:], 'little')
-    assert line.client.counters.aborted == 1
+    ):
+        line = Line()
+        promise = read(line)
+        line.receive(answer)
+        with pytest.raises(SdoAbortError, match=rf'joint1 \(node 5\) .*{words}') as caught:
+            promise.result()
+        assert caught.value.code == int.from_bytes(bytes.fromhex(answer)[4:], 'little')
+        assert line.client.counters.aborted == 1
 
 
 @pytest.mark.parametrize('garbage', [0, 3])
@@ -233,30 +230,30 @@ def test_a_lost_frame_costs_no_time_out_where_it_may_be_repeated(*, repeat: bool
     line.expect('2F 02 20 00 31 00 00 00')
 
 
-SPOILT = {
-    'toggle bit': (('41 18 10 01 0A 00 00 00', '10 30 31 32 33 34 35 36'), '00 00 03 05'),
-    'length 0': (('41 18 10 01 00 00 00 00', '00 30 31 32 33 34 35 36'), '10 00 07 06'),
-    'length 3': (('41 18 10 01 03 00 00 00', '00 30 31 32 33 34 35 36'), '10 00 07 06'),
-    'length 200': (('41 18 10 01 C8 00 00 00', '01 30 31 32 33 34 35 36'), '10 00 07 06'),
-    'without end': (
-        ('41 18 10 01 0A 00 00 00', *('00' + ' 00' * 7, '10' + ' 00' * 7) * 5),
-        '10 00 07 06',
-    ),
-    '4294967295 bytes announced': (('41 18 10 01 FF FF FF FF',), '05 00 04 05'),
+SEGMENT = '30 31 32 33 34 35 36'
+TOO_LONG = '10 00 07 06'
+SPOILT: dict[str, tuple[str, tuple[str, ...]]] = {
+    'toggle bit': ('00 00 03 05', ('0A 00 00 00', f'10 {SEGMENT}')),
+    'length 0': (TOO_LONG, ('00 00 00 00', f'00 {SEGMENT}')),
+    'length 3': (TOO_LONG, ('03 00 00 00', f'00 {SEGMENT}')),
+    'length 200': (TOO_LONG, ('C8 00 00 00', f'01 {SEGMENT}')),
+    'without end': (TOO_LONG, ('0A 00 00 00', *(f'00 {SEGMENT}', f'10 {SEGMENT}') * 5)),
+    '4294967295 bytes announced': ('05 00 04 05', ('FF FF FF FF',)),
 }
+"""Code of the abort; the length that the server announces, and its segments."""
 
 
-@pytest.mark.parametrize(('answers', 'code'), SPOILT.values(), ids=SPOILT)
-def test_a_transfer_that_is_spoilt_is_no_value(answers: tuple[str, ...], code: str) -> None:
+def test_a_transfer_that_is_spoilt_is_no_value() -> None:
     """It is ended, and the server gets the reason."""
-    line = Line()
-    promise = read(line)
-    for answer in answers:
-        line.receive(answer)
-    with pytest.raises(SdoAbortError):
-        promise.result()
-    aborts = [data.hex(' ') for data in line.sent if data[0] == 0x80]
-    assert aborts == [f'80 18 10 01 {code}']
+    for case, (code, (length, *segments)) in SPOILT.items():
+        line = Line()
+        promise = read(line)
+        for answer in (f'41 18 10 01 {length}', *segments):
+            line.receive(answer)
+        with pytest.raises(SdoAbortError):
+            promise.result()
+        aborts = [data.hex(' ') for data in line.sent if data[0] == 0x80]
+        assert aborts == [f'80 18 10 01 {code}'], case
 
 
 LATE: dict[str, str] = {
@@ -272,18 +269,18 @@ LATE: dict[str, str] = {
 }
 
 
-@pytest.mark.parametrize('late', LATE.values(), ids=LATE)
-def test_a_late_answer_of_something_else_does_no_harm(late: str) -> None:
+def test_a_late_answer_of_something_else_does_no_harm() -> None:
     """What does not answer an open request, before, in and after it, is counted only."""
-    line = Line()
-    line.receive('4F 18 10 01 2A 00 00 00')
-    promise = read(line)
-    line.receive(late)
-    assert not promise.done
-    line.receive('4F 18 10 01 2A 00 00 00')
-    assert promise.result() == b'\x2a'
-    line.receive('4F 18 10 01 2A 00 00 00')
-    assert line.client.counters.stale == 3
+    for case, late in LATE.items():
+        line = Line()
+        line.receive('4F 18 10 01 2A 00 00 00')
+        promise = read(line)
+        line.receive(late)
+        assert not promise.done, case
+        line.receive('4F 18 10 01 2A 00 00 00')
+        assert promise.result() == b'\x2a'
+        line.receive('4F 18 10 01 2A 00 00 00')
+        assert line.client.counters.stale == 3, case
 
 
 def test_a_late_answer_is_not_taken_for_the_next_one_of_its_object() -> None:

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 import re
 import struct
+from typing import TypeAlias
 
 from bus_rig import booted, JOINT, Leader, VirtualNetwork
 from drive_samples import (
@@ -290,9 +292,10 @@ def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool
     assert len(net.reported(Severity.ERROR)) == stops
 
 
-def judged(
-    setpoint: Callable[[float], float], position: Callable[[float], float], duration: float = 3.0
-) -> tuple[Following, float]:
+OfTime: TypeAlias = Callable[[float], float]
+
+
+def judged(setpoint: OfTime, position: OfTime, duration: float = 3.0) -> tuple[Following, float]:
     """Return the first verdict that is not that it follows, and when it came in [s]."""
     watch = FollowingWatch()
     for cycle in range(round(duration / PERIOD)):
@@ -304,63 +307,48 @@ def judged(
     return Following.FOLLOWS, duration
 
 
-@pytest.mark.parametrize(
-    ('setpoint', 'position', 'verdict', 'time'),
-    [
-        (lambda t: t, lambda t: 0.0, Following.LEFT_BEHIND, 0.6),
-        (lambda t: t, lambda t: 0.95 * t - 0.05, Following.FOLLOWS, 3.0),
-        (lambda t: t, lambda t: t - 0.4, Following.FOLLOWS, 3.0),
-        (lambda t: t, lambda t: t - 0.8, Following.LASTING_ERROR, 1.0),
-        (lambda t: 1.0, lambda t: 0.8, Following.LASTING_ERROR, 1.0),
-        (lambda t: 1.0, lambda t: 0.95 - 0.1 * t, Following.LASTING_ERROR, 1.5),
-        (lambda t: 1.0, lambda t: 0.85 if 1.0 < t < 1.9 else 1.0, Following.FOLLOWS, 3.0),
-        (lambda t: 1e-4 * t, lambda t: 0.3, Following.LASTING_ERROR, 1.0),
-    ],
-    ids=['stuck', 'slow', 'lag', 'far behind', 'droop', 'creep', 'transient', 'noise'],
-)
-def test_verdicts(
-    setpoint: Callable[[float], float],
-    position: Callable[[float], float],
-    verdict: Following,
-    time: float,
-) -> None:
+def test_verdicts() -> None:
     """Left behind is only who stands while the set-points move; the rest must not last."""
-    found, when = judged(setpoint, position)
-    assert found is verdict
-    assert when == pytest.approx(time, abs=0.05)
+    verdicts: dict[str, tuple[OfTime, OfTime, Following, float]] = {
+        'stuck': (lambda t: t, lambda t: 0.0, Following.LEFT_BEHIND, 0.6),
+        'slow': (lambda t: t, lambda t: 0.95 * t - 0.05, Following.FOLLOWS, 3.0),
+        'lag': (lambda t: t, lambda t: t - 0.4, Following.FOLLOWS, 3.0),
+        'far behind': (lambda t: t, lambda t: t - 0.8, Following.LASTING_ERROR, 1.0),
+        'droop': (lambda t: 1.0, lambda t: 0.8, Following.LASTING_ERROR, 1.0),
+        'creep': (lambda t: 1.0, lambda t: 0.95 - 0.1 * t, Following.LASTING_ERROR, 1.5),
+        'transient': (
+            *(lambda t: 1.0, lambda t: 0.85 if 1.0 < t < 1.9 else 1.0),
+            *(Following.FOLLOWS, 3.0),
+        ),
+        'noise': (lambda t: 1e-4 * t, lambda t: 0.3, Following.LASTING_ERROR, 1.0),
+    }
+    for case, (setpoint, position, verdict, time) in verdicts.items():
+        found, when = judged(setpoint, position)
+        assert found is verdict, case
+        assert when == pytest.approx(time, abs=0.05), case
 
 
-@pytest.mark.parametrize(
-    ('setpoint', 'position', 'verdict'),
-    [
-        (0.5, 0.0, Following.LEFT_BEHIND),
-        (0.5, 0.45, Following.FOLLOWS),
-        (0.0, -0.5, Following.FOLLOWS),
-    ],
-    ids=['stuck', 'followed', 'droop'],
-)
-def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions(
-    setpoint: float, position: float, verdict: Following
-) -> None:
+def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions() -> None:
     """Set-points that moved meanwhile have left it behind; a droop may pass.
 
     A sight that is too short to judge, one position and silence again, forgets nothing.
     """
-    watch = FollowingWatch()
-
-    def judge(now: float, *where: float, received: int) -> Following:
-        limits = {'margin': 0.1, 'window': 0.1}
-        return watch.judge(now, *where, error=False, received=received, **limits)
-
-    for cycle in range(10):
-        assert judge(cycle * PERIOD, 0.0, 0.0, received=cycle) is Following.FOLLOWS
-    stuck = verdict is Following.LEFT_BEHIND
-    for received, now in ((10, 1.0), (11, 2.0)):
-        watch.lose_sight()
-        watch.lose_sight()
-        first = judge(now, setpoint, position, received=received)
-        assert first is (Following.UNDECIDED if stuck else verdict)
-    assert judge(2.01, setpoint, position, received=12) is verdict
+    for setpoint, position, verdict in (
+        (0.5, 0.0, Following.LEFT_BEHIND),
+        (0.5, 0.45, Following.FOLLOWS),
+        (0.0, -0.5, Following.FOLLOWS),
+    ):
+        watch = FollowingWatch()
+        judge = partial(watch.judge, margin=0.1, window=0.1, error=False)
+        for cycle in range(10):
+            assert judge(cycle * PERIOD, 0.0, 0.0, received=cycle) is Following.FOLLOWS
+        stuck = verdict is Following.LEFT_BEHIND
+        for received, now in ((10, 1.0), (11, 2.0)):
+            watch.lose_sight()
+            watch.lose_sight()
+            first = judge(now, setpoint, position, received=received)
+            assert first is (Following.UNDECIDED if stuck else verdict)
+        assert judge(2.01, setpoint, position, received=12) is verdict
 
 
 @pytest.mark.parametrize('late', [False, True], ids=['pause of the master', 'late frames'])
@@ -547,18 +535,20 @@ def test_a_device_that_refuses_its_event_timer_is_named_until_it_takes_it() -> N
         net.lose()
 
 
-@pytest.mark.parametrize(
-    ('timer', 'inhibit', 'expected'),
-    [(0, 0, 0.1), (50, 0, 0.05), (10_000, 0, 0.1), (10_000, 2000, 0.4), (50, 2000, 0.4)],
-)
-def test_the_timer_of_the_eds_is_no_longer_than_ours(
-    timer: int, inhibit: int, expected: float
-) -> None:
+def test_the_timer_of_the_eds_is_no_longer_than_ours() -> None:
     """A loss is noticed after 0.3 s, unless the device sends less often (0x1800:03 in 0.1 ms)."""
-    config, defaults = drive_config(JOINT, NODE_ID), {(0x1800, 5): timer, (0x1800, 3): inhibit}
-    dictionary = with_defaults(config.dictionary, defaults)
+    config = drive_config(JOINT, NODE_ID)
     tpdo = replace(config.tpdos[0], transmission=255)
-    assert with_event_timer(tpdo, dictionary).event_time == pytest.approx(expected)
+    for timer, inhibit, expected in (
+        (0, 0, 0.1),
+        (50, 0, 0.05),
+        (10_000, 0, 0.1),
+        (10_000, 2000, 0.4),
+        (50, 2000, 0.4),
+    ):
+        defaults = {(0x1800, 5): timer, (0x1800, 3): inhibit}
+        dictionary = with_defaults(config.dictionary, defaults)
+        assert with_event_timer(tpdo, dictionary).event_time == pytest.approx(expected)
 
 
 def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
@@ -592,27 +582,23 @@ def bus_with(
     return load_bus(file)
 
 
-@pytest.mark.parametrize(
-    ('keys', 'time'),
-    [
+def test_the_event_timer_by_default(tmp_path: Path) -> None:
+    """It is set where it is needed and nobody has chosen, and tried only."""
+    for keys, time in (
         ('transmission: 255', 0.1),
         ('transmission: 254, inhibit_time: 2000', 0.4),
         ('transmission: 255, event_timer: 30', 0.03),
         ('transmission: 255, event_timer: 0', 0.0),
         ('transmission: 0', None),
         ('transmission: 1', None),
-    ],
-)
-def test_the_event_timer_by_default(tmp_path: Path, keys: str, time: float | None) -> None:
-    """It is set where it is needed and nobody has chosen, and tried only."""
-    bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n')
-    (node,) = bus.nodes
-    assert node.tpdos[0].event_time == time
-    writes = [write for write in boot_writes(bus, node) if write.address == (0x1800, 5)]
-    assert [struct.unpack('<H', write.data)[0] / 1000 for write in writes] == (
-        [] if time is None else [time]
-    )
-    assert [write.requested for write in writes] == ['event_timer' in keys] * len(writes)
+    ):
+        bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n')
+        (node,) = bus.nodes
+        assert node.tpdos[0].event_time == time, keys
+        writes = [write for write in boot_writes(bus, node) if write.address == (0x1800, 5)]
+        times = [struct.unpack('<H', write.data)[0] / 1000 for write in writes]
+        assert times == ([] if time is None else [time]), keys
+        assert [write.requested for write in writes] == ['event_timer' in keys] * len(writes)
 
 
 @pytest.mark.parametrize('sync_period', [10_000, 0])
