@@ -8,11 +8,12 @@ And drives whose EDS leaves something out, or that have none, and PDOs that lack
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import cycle
 from pathlib import Path
 import re
 
-from bus_rig import booted, VirtualNetwork
+from bus_rig import booted, JOINT, VirtualNetwork
 from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS, every_mode, PERIOD
 import pytest
 
@@ -35,7 +36,7 @@ from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
-JOINT, NODE_ID = 'joint1', 2
+NODE_ID = 2
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
 DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
 POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
@@ -45,7 +46,6 @@ TARGETS = {
     OperationMode.PROFILE_VELOCITY: VELOCITY,
     OperationMode.PROFILE_TORQUE: TORQUE,
 }
-SIZES = {POSITION: 4, VELOCITY: 4, VL_VELOCITY: 2, TORQUE: 2}
 
 
 def unmapped() -> NodeConfig:
@@ -61,12 +61,6 @@ def running_in(mode: OperationMode) -> VirtualNetwork:
     return net
 
 
-def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
-    """Write an object of the drive as another client would."""
-    data = value.to_bytes(SIZES[index], 'little', signed=True)
-    net.devices[JOINT].store.write(index, 0, data, net.now)
-
-
 def refuse(net: VirtualNetwork, index: int) -> None:
     """Make the drive abort all transfers of an object."""
     fault = FaultInjection(Fault.SDO_ABORT, object=(index, 0), abort=0x08000022)
@@ -76,6 +70,11 @@ def refuse(net: VirtualNetwork, index: int) -> None:
 def accept(net: VirtualNetwork) -> None:
     """Make the drive accept everything again."""
     net.devices[JOINT].faults.end(net.now)
+
+
+def moving(mode: OperationMode, size: float = 0.3) -> float:
+    """Return a target that moves a drive in a mode."""
+    return 1000.0 * size if mode is OperationMode.PROFILE_TORQUE else size
 
 
 def downloads(net: VirtualNetwork, since: float = 0.0) -> list[int]:
@@ -90,25 +89,10 @@ def give(net: VirtualNetwork, target: float) -> Promise[str]:
     return commands.deliver(lambda: commands.set_target(target))
 
 
-@pytest.mark.parametrize('mode', TARGETS)
-def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -> None:
-    """The answer has the object and the reason of the drive."""
-    net = running_in(mode)
-    net.do(JOINT, 'disable')
-    leave_behind(net, TARGETS[mode], 3_000)
-    refuse(net, TARGETS[mode])
-    with pytest.raises(DriveError, match=f'0x{TARGETS[mode]:04X}.*present device state'):
-        net.do(JOINT, 'enable')
-    net.run(0.5)
-    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
-    accept(net)
-    assert 'Operation enabled' in net.do(JOINT, 'enable')
-
-
 def test_a_refused_holding_value_keeps_the_mode() -> None:
     """The mode of before stays selected, and halted."""
     net = running_in(OperationMode.PROFILE_POSITION)
-    leave_behind(net, VELOCITY, 3_000)
+    net.devices[JOINT].store.find(VELOCITY).value = 3_000
     refuse(net, VELOCITY)
     before = net.motor()
     with pytest.raises(DriveError, match='0x60FF'):
@@ -139,82 +123,73 @@ def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> Non
     assert net.drives[JOINT].view.rate == pytest.approx(-0.3, abs=0.02)
 
 
-def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once() -> None:
-    """The ones behind it are not waited for, and are answered when they are queued."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.do(JOINT, 'halt')
-    refuse(net, POSITION)
-    commands = net.commands[JOINT]
-    first = commands.deliver(lambda: commands.move(Move(0.1)))
-    second = commands.deliver(lambda: commands.move(Move(0.2, immediate=False)))
-    net.run(0.5)
-    assert isinstance(first.error, DriveError)
-    assert second.done
-    assert net.drives[JOINT].halt.held
-    assert not net.drives[JOINT].halt.leaving
-
-
 @pytest.mark.parametrize('mode', TARGETS)
 def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> None:
-    """What the drive did before goes on, and the next target is executed."""
-    net = running_in(mode)
-    refuse(net, TARGETS[mode])
+    """What the drive did before goes on, and the next target is executed.
+
+    A drive that refuses the value that would hold it is not enabled.
+    """
+    net, index = running_in(mode), TARGETS[mode]
+    refuse(net, index)
     with pytest.raises(DriveError, match='present device state'):
-        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 100.0))
+        net.result(give(net, moving(mode, 0.4)))
     net.run(1.0)
     assert net.motor() == pytest.approx(0.0, abs=1e-3)
     accept(net)
-    target = 0.3 if mode is not OperationMode.PROFILE_TORQUE else 200.0
-    assert 'target' in net.result(give(net, target))
+    assert 'target' in net.result(give(net, moving(mode)))
     net.run(3.0)
     assert net.motor() > 0.05
     if mode is OperationMode.PROFILE_POSITION:
-        assert net.motor() == pytest.approx(target, abs=1e-3)
+        assert net.motor() == pytest.approx(0.3, abs=1e-3)
+    net.do(JOINT, 'disable')
+    net.devices[JOINT].store.find(index).value = 3_000  # as another client would leave it
+    refuse(net, index)
+    with pytest.raises(DriveError, match=f'0x{index:04X}.*present device state'):
+        net.do(JOINT, 'enable')
+    net.run(0.5)
+    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
+    accept(net)
+    assert 'Operation enabled' in net.do(JOINT, 'enable')
 
 
-def test_a_target_that_is_not_answered_is_no_success() -> None:
-    """A drive that is silent says nothing of what it has taken; the next target moves it."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.lose(REQUEST)
-    with pytest.raises(DriveError, match='did not answer'):
-        net.result(give(net, 0.4))
-    net.lose()
-    net.run(1.0)
-    assert net.motor() == pytest.approx(0.0, abs=1e-3)
-    net.result(give(net, 0.3))
-    net.run(2.0)
-    assert net.motor() == pytest.approx(0.3, abs=1e-3)
-
-
-@pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
-def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode) -> None:
-    """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
+@pytest.mark.parametrize('lost', [REQUEST, ANSWER])
+@pytest.mark.parametrize('mode', TARGETS)
+def test_a_target_that_is_not_answered_is_no_success(mode: OperationMode, lost: int) -> None:
+    """The drive may have it: as the answer is an error, the axis is halted until the next one."""
     net = running_in(mode)
     net.run(0.1)
-    net.lose(ANSWER)
+    net.lose(lost)
     with pytest.raises(DriveError, match='did not answer'):
-        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+        net.result(give(net, moving(mode, 0.4)))
     net.run(1.0)
     assert abs(net.drives[JOINT].view.rate) < 0.01
+    assert lost == ANSWER or net.motor() == pytest.approx(0.0, abs=1e-3)
     net.lose()
     net.run(0.5)
-    net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    before = net.motor()
+    net.result(give(net, moving(mode)))
     net.run(1.0)
-    assert net.drives[JOINT].view.rate > 0.1
+    assert net.motor() > before + 0.02
 
 
-def test_the_moves_behind_a_refused_one_are_dropped() -> None:
-    """Each counts from the one before, so none of them would end where it should."""
+@pytest.mark.parametrize('halted', [False, True])
+def test_the_moves_behind_a_refused_one_are_dropped(*, halted: bool) -> None:
+    """Each counts from the one before, so none would end where it should; a halt stays."""
     net = running_in(OperationMode.PROFILE_POSITION)
-    commands = net.commands[JOINT]
+    commands, drive = net.commands[JOINT], net.drives[JOINT]
+    if halted:
+        net.do(JOINT, 'halt')
     refuse(net, POSITION)
-    commands.move(Move(0.1))
-    commands.move(Move(0.2, immediate=False))
-    commands.move(Move(0.2, relative=True, immediate=False))
-    net.run(1.0)
+    moves = (Move(0.1), Move(0.2, immediate=False), Move(0.2, relative=True, immediate=False))
+    answers = [commands.deliver(partial(commands.move, move)) for move in moves]
+    net.run(0.5)  # the ones behind it are not waited for
+    assert all(answered.done for answered in answers)
+    assert isinstance(answers[0].error, DriveError)
     accept(net)
     net.run(2.0)
     assert net.motor() == pytest.approx(0.0, abs=1e-3)
+    assert drive.halt.held is halted
+    assert not drive.halt.leaving
     with pytest.raises(DriveError, match='absolute position first'):
         commands.move(Move(0.1, relative=True))
 
@@ -272,28 +247,30 @@ def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
 
 
 def test_only_the_target_of_the_mode_is_written() -> None:
-    """From boot to a mode and back, 0x6042 and 0x6071 belong to whoever else uses them."""
+    """0x6042 and 0x6071 belong to whoever else uses them; a drive at rest fills no bus."""
     net = booted(unmapped())
     net.run(1.0)
-    assert not set(downloads(net)) & set(TARGETS.values())
     net.do(JOINT, 'init')
     assert not set(downloads(net)) & set(TARGETS.values())
     net.select(JOINT, OperationMode.PROFILE_VELOCITY)
     net.do(JOINT, 'disable')
+    before, begin = net.wire.alters, net.now
+    noise = cycle((b'\x00', b'\x05'))  # moved by hand
+    net.alter(0x280 + NODE_ID, lambda data: next(noise) + data[1:])
+    net.run(2.0)
+    assert downloads(net, since=begin) == []
+    net.wire.alters = before
     net.do(JOINT, 'enable')
     net.run(1.0)
     assert set(downloads(net)) & set(TARGETS.values()) == {VELOCITY}
-
-
-def test_a_drive_that_is_moved_by_hand_is_not_written_to() -> None:
-    """Disabled, and its position changing in each cycle."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.do(JOINT, 'disable')
-    noise = cycle((b'\x00', b'\x05'))
-    net.alter(0x280 + NODE_ID, lambda data: next(noise) + data[1:])
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    net.target(0.5)
+    net.run(5.0)
+    assert net.motor() == pytest.approx(0.5, abs=1e-3)
     begin = net.now
     net.run(2.0)
-    assert downloads(net, since=begin) == []
+    assert net.frames(REQUEST, since=begin) == []
+    assert net.reported(Severity.WARNING) == []
 
 
 def test_a_controlword_that_is_refused_is_written_seldom() -> None:
@@ -338,34 +315,21 @@ def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
     assert dropped.error is None
 
 
-def without_default(*indices: int) -> ObjectDictionary:
-    """Return the drive's dictionary as a vendor writes it: objects without defaults."""
-    return ObjectDictionary(
-        replace(entry, default=None) if entry.index in indices else entry
-        for entry in drive_dictionary().for_node(2)
-    )
-
-
-def with_dictionary(dictionary: ObjectDictionary, **changes: object) -> VirtualNetwork:
-    """Boot a drive that has this dictionary."""
-    config = replace(drive_config(JOINT, 2), dictionary=dictionary, **changes)  # type: ignore[arg-type]
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
-    return net
-
-
 def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     """0x6502 of EPOS, Kollmorgen and Elmo has no default; the drive is of use all the same."""
     dictionary = ObjectDictionary(
-        entry for entry in without_default(0x6502) if entry.index not in (0x6071, 0x6042)
+        replace(entry, default=None) if entry.index == 0x6502 else entry
+        for entry in drive_dictionary().for_node(2)
+        if entry.index not in (0x6071, 0x6042)
     )
-    net = with_dictionary(dictionary)
+    net = booted(replace(drive_config(JOINT, 2), dictionary=dictionary))
     reported = net.drives[JOINT].view.parameters.supported_modes
     assert reported
-    wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.PROFILE_VELOCITY)
-    assert all(reported & mode.support_bit for mode in wanted)
-    missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
-    assert not any(reported & mode.support_bit for mode in missing)
+    has = {mode for mode in OperationMode if mode > 0 and reported & mode.support_bit}
+    wanted = {OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.PROFILE_VELOCITY}
+    missing = {OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY}
+    assert wanted <= has
+    assert not missing & has
     net.enable(OperationMode.PROFILE_POSITION)
     net.target(0.3)
     net.run(5.0)
@@ -397,19 +361,6 @@ def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(tmp_p
     assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=2e-3)
     held = net.result(net.network.nodes[JOINT].sdo.read(0x1A01, 1, 1.0))
     assert BootWrite(0x1A01, 1, b'\x10\x00\x41\x60', 'tpdo').fits(held)
-
-
-def test_an_idle_drive_fills_no_bus_with_its_targets() -> None:
-    """Each target is reached; enabled and at rest, nothing is written by SDO."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    for target in (0.5, -0.2):
-        net.target(target)
-        net.run(5.0)
-        assert net.drives[JOINT].view.position == pytest.approx(target, abs=1e-3)
-    begin = net.now
-    net.run(2.0)
-    assert net.frames(REQUEST, since=begin) == []
-    assert net.reported(Severity.WARNING) == []
 
 
 def test_a_stream_needs_its_rpdo() -> None:
