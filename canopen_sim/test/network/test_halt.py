@@ -14,7 +14,6 @@ from bus_rig import booted, JOINT, SetPointKind, SetPoints, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
-    drive_dictionary,
     every_mode,
     MOTION_WRITES,
     pdo,
@@ -22,11 +21,11 @@ from drive_samples import (
     SCALE,
     sdo_write,
 )
-from hypothesis import given, Phase, settings, strategies
+from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
+from arm_canopen import DriveError, DriveState, OperationMode, Severity
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
 from arm_canopen.cia402.stop import UNDER_HALT_TIME
@@ -268,9 +267,8 @@ def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on()
 @pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
 def test_recovery_does_not_undo_a_stop(verb: str) -> None:
     """A drive that was commanded to stop while it was away is not enabled when it comes back."""
-    drive = drive_config(JOINT, NODE_ID)
-    axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
-    net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
+    scales = {'recovery': RecoveryPolicy.AUTO}
+    net = running_in(OperationMode.CYCLIC_POSITION, scales=scales)
     net.power_off(JOINT)
     net.run(1.0)
     if verb:
@@ -411,56 +409,37 @@ def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
     assert not net.reported(Severity.WARNING)
 
 
-def without_velocity() -> NodeConfig:
-    """Return a drive whose 0x606C is neither in a PDO nor in its EDS."""
-    config = drive_config(JOINT, NODE_ID)
-    entries = (entry for entry in config.dictionary if entry.index != 0x606C)
-    position = pdo(2, 0x280 + NODE_ID, (0x6064, 0))
-    return replace(config, dictionary=ObjectDictionary(entries), tpdos=(config.tpdos[0], position))
-
-
-def with_profile_velocity(velocity_inc: int) -> NodeConfig:
-    """Return a drive with another 0x6081 in [inc/s]."""
-    writes = tuple(write for write in MOTION_WRITES if write.index != 0x6081)
-    profile = sdo_write(0x6081, 0, velocity_inc)
-    return drive_config(JOINT, NODE_ID, sdo_writes=(*writes, profile))
-
-
-def running(config: NodeConfig, mode: OperationMode, target: float) -> VirtualNetwork:
-    """Return a network with one drive that moves."""
-    dictionaries = {JOINT: drive_dictionary().for_node(NODE_ID)}
-    net = VirtualNetwork(bus_config(config), dictionaries=dictionaries)
-    net.boot()
-    net.enable(mode)
-    net.target(target)
-    net.run(0.8)
-    assert abs(net.speed()) > 0.3
-    return net
-
-
 def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:
     """Shown to motion sources and in /joint_states, a few cycles late."""
-    net = running(without_velocity(), OperationMode.PROFILE_VELOCITY, 0.5)
+    config = drive_config(JOINT, NODE_ID)
+    has = config.dictionary
+    net = VirtualNetwork(
+        bus_config(
+            replace(
+                config,
+                dictionary=ObjectDictionary(entry for entry in has if entry.index != 0x606C),
+                tpdos=(config.tpdos[0], pdo(2, 0x280 + NODE_ID, (0x6064, 0))),
+            )
+        ),
+        dictionaries={JOINT: has},
+    )
+    net.boot()
+    net.enable(OperationMode.PROFILE_VELOCITY)
+    net.target(0.5)
+    net.run(0.8)
+    assert net.speed() == pytest.approx(0.5, rel=0.02)
     assert net.drives[JOINT].view.velocity == pytest.approx(0.5, rel=0.02)
 
 
 METRE = 1_000_000.0  # [inc/m]
-METRES = {
-    f'scale_{what}_{way}_dev': METRE if way == 'to' else 1 / METRE
-    for what in ('pos', 'vel')
-    for way in ('to', 'from')
-}
+METRES = {'scale_pos_to_dev': METRE, 'scale_pos_from_dev': 1 / METRE}
+METRES |= {'scale_vel_to_dev': METRE, 'scale_vel_from_dev': 1 / METRE}
 
 
 def sliding(*writes: tuple[int, int, int]) -> VirtualNetwork:
     """Return an enabled network with one drive that counts micrometres, and holds these values."""
-    config = drive_config(
-        JOINT,
-        NODE_ID,
-        scales=METRES,
-        sdo_writes=tuple(sdo_write(*write) for write in ((0x60C2, 1, 10), *writes)),
-    )
-    net = booted(config)
+    values = tuple(sdo_write(*write) for write in ((0x60C2, 1, 10), *writes))
+    net = booted(drive_config(JOINT, NODE_ID, scales=METRES, sdo_writes=values))
     net.do(JOINT, 'init')
     return net
 
@@ -523,8 +502,9 @@ def test_a_coarse_unit_of_velocity_hides_no_motion() -> None:
 
 def test_noise_is_standstill() -> None:
     """A slow profile and an encoder that flickers: a halt ends, and the mode can be switched."""
-    net = booted(with_profile_velocity(500))
-    net.enable(OperationMode.PROFILE_POSITION)
+    net = running_in(
+        OperationMode.PROFILE_POSITION, sdo_writes=(*MOTION_WRITES, sdo_write(0x6081, 0, 500))
+    )
     noise = cycle((-10, 10))
 
     def flickers(data: bytes) -> bytes:
@@ -537,9 +517,9 @@ def test_noise_is_standstill() -> None:
 
 
 @given(
-    rate=strategies.floats(min_value=-1e6, max_value=1e6),
-    start=strategies.integers(min_value=-(2**30), max_value=2**30),
-    period=strategies.floats(min_value=1e-3, max_value=0.05),
+    rate=st.floats(min_value=-1e6, max_value=1e6),
+    start=st.integers(min_value=-(2**30), max_value=2**30),
+    period=st.floats(min_value=1e-3, max_value=0.05),
 )
 def test_the_estimate_is_the_rate(rate: float, start: int, period: float) -> None:
     """Whatever the cycle and the resolution, within what one increment makes in the window."""

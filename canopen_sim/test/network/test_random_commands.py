@@ -23,8 +23,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
-from enum import Enum
+from dataclasses import dataclass, replace
 import math
 import random
 import re
@@ -83,6 +82,8 @@ NEAR = 0.01  # [rad]
 NEVER = float('inf')
 READY_MAX = 15.0  # [s] until all is booted when the faults are over
 
+ON, MODE = ('enable', None), OperationMode
+PP, IP, CSP = MODE.PROFILE_POSITION, MODE.INTERPOLATED_POSITION, MODE.CYCLIC_POSITION
 STOP_ALL = 'stop all'
 ENABLING = ('init', 'enable', 'recover', 'home')
 CAUSES = ('fault', 'nmt', 'left', 'follow', 'stream', 'cancel')
@@ -98,15 +99,9 @@ FAULTS = (
     *(MASTER_UNHEARD, BUS_DOWN),
 )
 DEVIATIONS = (
-    *(
-        Fault.HALT_IGNORED,
-        Fault.QUICK_STOP_IGNORED,
-        Fault.QUICK_STOP_FINAL,
-        Fault.MODE_REQUIRED,
-        Fault.MODE_ZERO_REFUSED,
-    ),
-    *(Fault.MODE_HELD_UNDER_HALT, Fault.ARRIVED_WHEN_DISABLED, Fault.EMCY_FLOOD),
-    *(Fault.SDO_FOUR_BYTES, Fault.SDO_NO_SIZE, Fault.SDO_SHORT),
+    *(Fault.HALT_IGNORED, Fault.QUICK_STOP_IGNORED, Fault.QUICK_STOP_FINAL, Fault.MODE_REQUIRED),
+    *(Fault.MODE_ZERO_REFUSED, Fault.MODE_HELD_UNDER_HALT, Fault.ARRIVED_WHEN_DISABLED),
+    *(Fault.EMCY_FLOOD, Fault.SDO_FOUR_BYTES, Fault.SDO_NO_SIZE, Fault.SDO_SHORT),
 )
 HOMING = {17: 0.05, 33: 0.05, 35: NEAR, 37: NEAR}
 """How far from home [rad] the axis stands after a homing method."""
@@ -115,34 +110,24 @@ ENDED = re.compile('was ended by|^cancelled')
 SLOW_RAMP = round(SCALE / 60)  # [inc/s^2] of a quick stop that takes a minute
 OPTIONS = {0x6007: range(4), 0x605A: (0, 1, 2, 5, 6), 0x605B: (0, 1), 0x605C: (0, 1)}
 OPTIONS |= {0x605D: (1, 2, 3), 0x605E: (0, 1, 2)}
-BY_SDO = (
-    OperationMode.PROFILE_POSITION,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.PROFILE_TORQUE,
-)
+BY_SDO = (PP, MODE.PROFILE_VELOCITY, MODE.PROFILE_TORQUE)
 """Modes whose target may go by SDO."""
 ASYNCHRONOUS = 255
 SETPOINTS = {0x300 + NODE_ID: 8, 0x400 + NODE_ID: 7}
 """Streamed modes, by the COB-ID of the RPDO that begins with their target."""
 STEP_MAX = round(1.1 * SCALE * CYCLE)  # [inc] at the profile velocity, 1 rad/s
 COMMANDS = {0x0F: 'enable operation', 0x07: 'switch on'}
+READY, ON_WITHOUT_TORQUE = DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON
+ENABLED, BRAKING = DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE
 ACCEPTED = {
     'fault reset': (DriveState.FAULT,),
-    'switch on': (
-        DriveState.READY_TO_SWITCH_ON,
-        DriveState.SWITCHED_ON,
-        DriveState.OPERATION_ENABLED,
-    ),
-    'enable operation': (
-        DriveState.SWITCHED_ON,
-        DriveState.OPERATION_ENABLED,
-        DriveState.QUICK_STOP_ACTIVE,
-    ),
+    'switch on': (READY, ON_WITHOUT_TORQUE, ENABLED),
+    'enable operation': (ON_WITHOUT_TORQUE, ENABLED, BRAKING),
 }
 """States in which a drive takes a command (CiA 402-2, figure 4)."""
 
-POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-UNPOWERED = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON)
+POWERED = (ENABLED, BRAKING)
+UNPOWERED = (DriveState.SWITCH_ON_DISABLED, READY, ON_WITHOUT_TORQUE)
 LOST_TPDOS = (Fault.TPDO_LOSS, Fault.FRAME_LOSS, Fault.DISCONNECT, BUS_DOWN)
 
 MOVE_KINDS = ((True, False), (True, True), (False, False), (False, True))
@@ -166,35 +151,28 @@ class Kind:
     home_method: int = 0  # that of bus.yml (0x6098), 0 for none
     # what becomes of it when its device comes back
     recovery: RecoveryPolicy = RecoveryPolicy.MANUAL
-    switching_state: DriveState = DriveState.OPERATION_ENABLED  # in which its mode is switched
+    switching_state: DriveState = ENABLED  # in which its mode is switched
 
     @property
     def config(self) -> NodeConfig:
         """The drive as bus.yml has it."""
         limits = ((0x607D, 1, round(-LIMIT * SCALE)), (0x607D, 2, round(LIMIT * SCALE)))
         options = ((index, 0, value) for index, value in self.options)
-        timing = (0x60C2, 1, round(1000 * CYCLE))
-        homing = [(0x6099, 1, 3_000), (0x6099, 2, 1_000), (0x609A, 0, 30_000)]
-        if self.home_method:
-            homing.append((0x6098, 0, self.home_method))
-        if self.slow:
-            homing.append((0x6085, 0, SLOW_RAMP))
-        writes = (sdo_write(*write) for write in (timing, *limits, *options, *homing))
-        position_mode = (
-            OperationMode.PROFILE_POSITION if self.by_sdo else OperationMode.CYCLIC_POSITION
+        others = [(0x60C2, 1, round(1000 * CYCLE))]
+        others += [(0x6099, 1, 3_000), (0x6099, 2, 1_000), (0x609A, 0, 30_000)]
+        others += [(0x6098, 0, self.home_method)] if self.home_method else []
+        others += [(0x6085, 0, SLOW_RAMP)] if self.slow else []
+        scales = {
+            'position_mode': int(PP if self.by_sdo else CSP),
+            'recovery': self.recovery,
+            'switching_state': self.switching_state,
+        }
+        writes = (
+            *MOTION_WRITES,
+            *(sdo_write(*write) for write in (*limits, *options, *others)),
         )
         drive = every_mode(
-            drive_config(
-                JOINT,
-                NODE_ID,
-                scales={
-                    'position_mode': int(position_mode),
-                    'recovery': self.recovery,
-                    'switching_state': self.switching_state,
-                },
-                heartbeat_consumer=True,
-                sdo_writes=(*MOTION_WRITES, *writes),
-            )
+            drive_config(JOINT, NODE_ID, scales=scales, heartbeat_consumer=True, sdo_writes=writes)
         )
         seen, timer = list(drive.tpdos), CYCLE if self.transmission == ASYNCHRONOUS else None
         if not self.velocity:
@@ -237,7 +215,7 @@ def draw(seed: int) -> Scenario:
             chance.random() < 0.25,
             chance.choice((0, 0, *HOMING)),
             chance.choice(list(RecoveryPolicy)),
-            chance.choice((*[DriveState.OPERATION_ENABLED] * 3, DriveState.SWITCHED_ON)),
+            chance.choice((*[ENABLED] * 3, DriveState.SWITCHED_ON)),
         )
     if kind.slow:
         kind = replace(kind, options=((0x605A, 6),))  # it keeps its power
@@ -385,7 +363,7 @@ class Run:
         answer = self._commands.set_target(value)
         if not self._is_late:
             states = {state for _, state in self._states}
-            assert DriveState.OPERATION_ENABLED in states, 'a target of a drive without power'
+            assert ENABLED in states, 'a target of a drive without power'
         assert abs(value) < 1e6, 'what is no target'  # nor is NaN
         assert abs(value) < 5.0 or self._mode not in POSITION_MODES, 'target beyond the limits'
         self._allow_motion()
@@ -427,7 +405,7 @@ class Run:
         """Write a target as another client would have, where none acts."""
         store, (index, _) = self.net.devices[JOINT].store, TARGET_OBJECTS[mode]
         shown = OperationMode(store.integer(0x6061).value)
-        enabled = self.net.simulated().state is DriveState.OPERATION_ENABLED
+        enabled = self.net.simulated().state is ENABLED
         if not (enabled and TARGET_OBJECTS.get(shown) == (index, 0)):
             size = 2 if mode in TORQUE_MODES else 4
             store.write(index, 0, value.to_bytes(size, 'little', signed=True), self.net.now)
@@ -546,7 +524,7 @@ class Run:
         drive = self.net.simulated()
         argument, before = command
         recent = {state for _, state in self._states} | {drive.state}
-        enabled = drive.state is DriveState.OPERATION_ENABLED  # else it may coast
+        enabled = drive.state is ENABLED  # else it may coast
         ignored = what == 'halt' and Fault.HALT_IGNORED in self._kind.deviations
         if ignored and self._mode in TORQUE_MODES:
             self._allow_motion()  # it stood, as its torque had only begun
@@ -562,13 +540,13 @@ class Run:
             self._rest('it has arrived')
         if what in ENABLING:
             self._may_return = True
-            assert DriveState.OPERATION_ENABLED in recent, f'{what}: {answer!r}, but is {recent}'
+            assert ENABLED in recent, f'{what}: {answer!r}, but is {recent}'
         if what in STOPPING:
-            said = DriveState.OPERATION_ENABLED.title in answer
-            true = DriveState.OPERATION_ENABLED in recent if said else not enabled
+            said = ENABLED.title in answer
+            true = ENABLED in recent if said else not enabled
             assert true, f'{what}: {answer!r}, but it is in {drive.state}'
         if what in ('disable', 'shutdown'):
-            assert drive.state is not DriveState.OPERATION_ENABLED, f'{what}: {answer!r}'
+            assert drive.state is not ENABLED, f'{what}: {answer!r}'
         torque = before in TORQUE_MODES or argument in TORQUE_MODES  # which holds a load
         if what in ('mode', 'init') and enabled and not torque and 'already' not in answer:
             self._rest(f'{what}: {answer}')
@@ -637,18 +615,18 @@ class Run:
     @property
     def _enabling(self) -> tuple[str, ...]:
         """Commands that may enable the drive."""
-        switches = self._kind.switching_state is DriveState.OPERATION_ENABLED
+        switches = self._kind.switching_state is ENABLED
         return ENABLING if switches else (*ENABLING, 'mode')
 
     def _judge_state(self) -> None:
         now, state = self.net.now, self.net.simulated().state
         if any(what in self._enabling for what, *_ in self._promises):
             self._enabling_until = now + (LATE if self._is_late else 5 * CYCLE)
-        enabled = state is DriveState.OPERATION_ENABLED
+        enabled = state is ENABLED
         if self._halted and enabled and not self._is_late:
             assert 'halted' in self.net.drives[JOINT].describe(), 'its halt has ended by itself'
         before = self._states[-1][1] if self._states else state
-        was = before is DriveState.OPERATION_ENABLED
+        was = before is ENABLED
         if enabled and not was:
             again = self._may_return and self._kind.recovery is RecoveryPolicy.AUTO
             assert now < self._enabling_until or again, f'enabled by itself: {self.net.story()}'
@@ -788,7 +766,7 @@ class Trace:
             yield f'{now:.2f} s: controlword 0x{word:04X}, {command}, in {self._state.title}'
 
     def _judge_setpoint(self, mode: int, setpoint: int, now: float) -> Iterator[str]:
-        acts = self._state is DriveState.OPERATION_ENABLED and self._mode == mode
+        acts = self._state is ENABLED and self._mode == mode
         if not acts or not self._shown(now):
             self._setpoints.pop(mode, None)
             return
@@ -801,73 +779,52 @@ class Trace:
 
 
 FOUND: tuple[Scenario, ...] = (
-    Scenario(  # a device that restarts has mode 0, which is not the one to be selected
-        Kind(),
-        (('mode', OperationMode.PROFILE_POSITION, 0.03), ('nmt', NmtCommand.RESET_NODE, 0.2)),
-        OperationMode.VELOCITY,
-    ),
+    # a device that restarts has mode 0, which is not the one to be selected
+    Scenario(Kind(), (('mode', PP, 0.03), ('nmt', NmtCommand.RESET_NODE, 0.2)), MODE.VELOCITY),
     Scenario(  # the mode that a drive shows goes with the 0 of its first RPDO
         Kind((Fault.MODE_REQUIRED,), options=((0x6007, 0),)),
-        (('enable', None), ('mode', OperationMode.VELOCITY, None), ('fault', BUS_DOWN, 2.0, None)),
-        OperationMode.PROFILE_POSITION,
+        (ON, ('mode', MODE.VELOCITY, None), ('fault', BUS_DOWN, 2.0, None)),
+        PP,
     ),
     Scenario(  # a motor that has only begun to follow its target stands no more
         Kind(transmission=ASYNCHRONOUS, slow=True),
-        (
-            ('enable', None),
-            ('mode', OperationMode.CYCLIC_POSITION, None),
-            ('target', -0.62, 0.02),
-            ('quick_stop', None),
-        ),
-        OperationMode.INTERPOLATED_POSITION,
+        (ON, ('mode', CSP, None), ('target', -0.62, 0.02), ('quick_stop', None)),
+        IP,
     ),
-    Scenario(  # the words of a quick stop keep the halt up, by RPDO and by SDO
-        Kind((Fault.QUICK_STOP_IGNORED,)), (), OperationMode.PROFILE_TORQUE
-    ),
+    # the words of a quick stop keep the halt up, by RPDO and by SDO
+    Scenario(Kind((Fault.QUICK_STOP_IGNORED,)), (), MODE.PROFILE_TORQUE),
     Scenario(  # a motor that all but stands gets no torque of its last braking with its power
         Kind((Fault.MODE_REQUIRED,), velocity=False),
         (
-            ('enable', None),
-            ('mode', OperationMode.PROFILE_TORQUE, None),
-            ('target', 0.44, None),
-            ('quick_stop', 0.03),
-            ('nmt', NmtCommand.RESET_COMMUNICATION, 0.2),
-            ('recover', 0.0),
+            *(ON, ('mode', MODE.PROFILE_TORQUE, None), ('target', 0.44, None)),
+            *(
+                ('quick_stop', 0.03),
+                ('nmt', NmtCommand.RESET_COMMUNICATION, 0.2),
+                ('recover', 0.0),
+            ),
         ),
-        OperationMode.INTERPOLATED_POSITION,
+        IP,
     ),
     Scenario(  # a move is halted in the mode that init could not end, and stays so
         Kind((Fault.MODE_HELD_UNDER_HALT,)),
-        (
-            ('enable', None),
-            ('mode', OperationMode.PROFILE_POSITION, None),
-            ('target', -0.8, 0.2),
-            ('init', None),
-            ('mode', OperationMode.PROFILE_POSITION, None),
-        ),
-        OperationMode.PROFILE_POSITION,
+        (ON, ('mode', PP, None), ('target', -0.8, 0.2), ('init', None), ('mode', PP, None)),
+        PP,
     ),
     Scenario(  # home is not where a motor passes
         Kind(),
-        (
-            ('enable', None),
-            ('mode', OperationMode.CYCLIC_TORQUE, None),
-            ('target', -7.0, 0.4),
-            ('home', 37, None),
-        ),
-        OperationMode.CYCLIC_POSITION,
+        (ON, ('mode', MODE.CYCLIC_TORQUE, None), ('target', -7.0, 0.4), ('home', 37, None)),
+        CSP,
     ),
     Scenario(  # a command that enables the drive may be on its way when it is disabled
         Kind(options=((0x605A, 6),)),
         (
-            ('enable', None),
-            ('fault', Fault.RPDO_DELAY, 2.0, None),
-            ('quick_stop', None),
-            ('home', 17, 0.06),
-            ('disable', 0.2),
+            *(ON, ('fault', Fault.RPDO_DELAY, 2.0, None), ('quick_stop', None)),
+            *(('home', 17, 0.06), ('disable', 0.2)),
         ),
-        OperationMode.CYCLIC_TORQUE,
+        MODE.CYCLIC_TORQUE,
     ),
+    # the bits of a homing are no success of the next one, which a halt keeps from beginning
+    Scenario(Kind(home_method=35), (('init', None), ('home', NO_METHOD, None)), PP),
 )
 """Scenarios that have failed."""
 
@@ -881,25 +838,19 @@ def failure(scenario: Scenario) -> str:
     return ''
 
 
-def as_code(value: object) -> str:
-    """Return an expression for a scenario or a part of it."""
-    if isinstance(value, Enum):
-        return f'{type(value).__name__}.{value.name}'
-    if isinstance(value, tuple):
-        return f'({"".join(f"{as_code(each)}, " for each in value)})'
-    if is_dataclass(value):
-        shown = (f'{each.name}={as_code(getattr(value, each.name))}' for each in fields(value))
-        return f'{type(value).__name__}({", ".join(shown)})'
-    return repr(value)
+def as_code(scenario: Scenario) -> str:
+    """Return the expression of a scenario: members of an enumeration by their names."""
+    return re.sub(r'<(\w+\.\w+): (?:[^<>]|<[^<>]*>)*>', r'\1', repr(scenario))
 
 
 def shortened(scenario: Scenario) -> Scenario:
     """Remove every step and deviation that the failure does not need."""
-    tries = [replace(scenario, kind=Kind())]
-    tries += [replace(scenario, kind=replace(scenario.kind, deviations=()))]
-    tries += [replace(scenario, kind=replace(scenario.kind, options=()))]
-    for simpler in tries:
-        if failure(simpler):
+    for kind in (
+        replace(scenario.kind, options=()),
+        replace(scenario.kind, deviations=()),
+        Kind(),
+    ):
+        if failure(simpler := replace(scenario, kind=kind)):
             scenario = simpler
     for n in reversed(range(len(scenario.steps))):
         simpler = replace(scenario, steps=scenario.steps[:n] + scenario.steps[n + 1 :])
