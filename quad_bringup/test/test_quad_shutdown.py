@@ -73,14 +73,13 @@ Leaves = Callable[..., list[str]]
 @pytest.mark.parametrize('state', ['', 'to '])
 @pytest.mark.parametrize('mode', ['stand', 'walk', 'turn', 'policy', 'get_up', 'fault'])
 def test_a_robot_on_its_feet_lies_down(mode: str, state: str, leaves: Leaves) -> None:
-    """Also one that is on its way there, or has a fault; the log says how not to wait."""
+    """Also one that is on its way there, or has a fault; the log says how not to wait.
+
+    One on its way down is waited for: left now, it would stay half-way.
+    """
     controller = Controller(f'{state}{mode}')
     assert leaves(controller) == [LYING_DOWN]
     assert controller.modes == ['lie']
-
-
-def test_a_robot_on_its_way_down_is_waited_for(leaves: Leaves) -> None:
-    """Left now, it would stay half-way."""
     assert leaves(Controller('to lie')) == [LYING_DOWN]
 
 
@@ -92,18 +91,16 @@ def test_a_robot_that_is_to_hold_ends_its_gait_first(state: str, leaves: Leaves)
     assert (controller.modes, controller.state) == (['stand'], 'stand')
 
 
-@pytest.mark.parametrize(
-    ('state', 'hold'),
-    [('relax', False), ('lie', False)]
-    + [(state, True) for state in ('stand', 'lie', 'to lie', 'relax', 'fault')],
-)
-def test_a_robot_that_needs_nothing_is_left_as_it_is(
-    state: str, hold: bool, leaves: Leaves
-) -> None:
+def test_a_robot_that_needs_nothing_is_left_as_it_is(leaves: Leaves) -> None:
     """Without a word."""
-    controller = Controller(state)
-    assert leaves(controller, hold=hold) == []
-    assert controller.modes == []
+    for hold, states in (
+        (False, ('relax', 'lie')),
+        (True, ('stand', 'lie', 'to lie', 'relax', 'fault')),
+    ):
+        for state in states:
+            controller = Controller(state)
+            assert leaves(controller, hold=hold) == [], (state, hold)
+            assert controller.modes == [], (state, hold)
 
 
 def test_a_robot_that_fails_on_its_way_down_is_asked_once_more(leaves: Leaves) -> None:
@@ -121,7 +118,10 @@ def test_a_robot_that_fails_on_its_way_down_is_asked_once_more(leaves: Leaves) -
 
 
 def test_a_controller_that_does_not_help_is_left(leaves: Leaves) -> None:
-    """It refuses, never gets there, or its state never arrives: reported, and no error."""
+    """It refuses, never gets there, or its state never arrives: reported, and no error.
+
+    After a second Ctrl-C no mode is requested any more.
+    """
     refusing, idle, silent = Controller('walk'), Controller('walk'), Controller('')
     refusing.refusal = 'battery low'
     idle.follows = False
@@ -129,10 +129,6 @@ def test_a_controller_that_does_not_help_is_left(leaves: Leaves) -> None:
     assert leaves(idle)[-1].endswith('in vain for it to lie')
     assert leaves(silent)[-1].endswith('in vain for the state of the controller')
     assert leaves(refusing, hold=True)[-1].startswith('stopping without standing still')
-
-
-def test_ctrl_c_again_ends_the_wait(leaves: Leaves) -> None:
-    """No mode is requested any more."""
-    controller = Controller('walk')
-    assert leaves(controller, given_up=True) == ['stopping without lying down']
-    assert controller.modes == []
+    given_up = Controller('walk')
+    assert leaves(given_up, given_up=True) == ['stopping without lying down']
+    assert given_up.modes == []

@@ -37,28 +37,18 @@ from quad_sim.options import build, parse_arguments, Simulation
 DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
 
 
-def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
-    """As in the article: ros2 launch quad_bringup bringup.launch.py."""
-    arguments = parse(argv(DEFAULTS))[0]
-    assert not arguments.simulate
-    assert arguments.port == '/dev/ttyAMA0'
-    assert arguments.preset == 'lite'
-    simulated = parse(argv({**DEFAULTS, 'simulate': 'true'}))[0]
-    assert simulated.simulate
-    assert simulated.port is None
-
-
-def test_every_argument_reaches_the_bring_up() -> None:
-    """Under its own name."""
-    given = {'preset': 'mini', 'arm': 'True', 'policy': '/a.onnx', 'calibration': '/c.yaml'}
-    arguments = parse(argv({**DEFAULTS, **given, 'port': '/dev/ttyUSB0'}))[0]
-    assert (arguments.port, arguments.preset, arguments.arm) == ('/dev/ttyUSB0', 'mini', True)
-    assert (arguments.policy, arguments.calibration) == (Path('/a.onnx'), Path('/c.yaml'))
-    assert parse(argv({**DEFAULTS, 'gait': 'pace'}))[0].gait == 'pace'
-
-
-def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:
-    """With its name."""
+def test_every_argument_of_launch_reaches_the_bring_up() -> None:
+    """Under its own name; without any it is the real robot, on its own computer (the article)."""
+    for given, expected in (
+        ({}, {'simulate': False, 'port': '/dev/ttyAMA0', 'preset': 'lite'}),
+        ({'simulate': 'true'}, {'simulate': True, 'port': None}),
+        ({'preset': 'mini', 'arm': 'True'}, {'preset': 'mini', 'arm': True}),
+        ({'policy': '/a.onnx'}, {'policy': Path('/a.onnx')}),
+        ({'calibration': '/c.yaml'}, {'calibration': Path('/c.yaml')}),
+        ({'gait': 'pace', 'port': '/dev/ttyUSB0'}, {'gait': 'pace', 'port': '/dev/ttyUSB0'}),
+    ):
+        arguments = vars(parse(argv({**DEFAULTS, **given}))[0])
+        assert {name: arguments[name] for name in expected} == expected
     with pytest.raises(ArgumentError, match='arm:=maybe'):
         argv({**DEFAULTS, 'arm': 'maybe'})
 
@@ -180,17 +170,6 @@ def test_everyone_has_the_same_robot(tmp_path: Path, preset: str, arm: bool) -> 
 
 
 @pytest.mark.slow
-def test_a_calibration_counts(tmp_path: Path) -> None:
-    """What calibrate has written reaches the bridge, beside the description."""
-    calibration = tmp_path / 'calibration.yaml'
-    values = {'joints': {'fl_hip_joint': {'sign': -1}}, 'imu': {'mounting_checked': True}}
-    write_calibration(calibration, values)
-    settings = bridge_of(processes(tmp_path, Stack('/dev/ttyAMA0', calibration=calibration)))
-    assert settings.robot.joints.servos[0].sign == -1
-    assert settings.robot.estimator.mounting.checked
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize('protocol', ['auto', 'v2', 'v1'])
 def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol: str) -> None:
     """Whichever the bridge tries first, the simulated robot answers in it."""
@@ -206,21 +185,27 @@ def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol:
 
 
 @pytest.mark.slow
-def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
+def test_gait_policy_and_calibration_reach_their_nodes(tmp_path: Path) -> None:
     """A policy, and a folder for recordings, only where there is one."""
-    settings = controller_of(processes(tmp_path, Stack('p', gait='crawl')))
-    assert (settings.gait.value, settings.policy) == ('crawl', '')
-    settings = controller_of(processes(tmp_path, Stack('p', policy=Path('/a.onnx'))))
-    assert (settings.gait.value, settings.policy) == ('trot', '/a.onnx')
-    assert settings.record == ''
-    settings = controller_of(processes(tmp_path, Stack('p', record=Path('/runs'))))
-    assert settings.record == '/runs'
+    calibration = tmp_path / 'calibration.yaml'
+    values = {'joints': {'fl_hip_joint': {'sign': -1}}, 'imu': {'mounting_checked': True}}
+    write_calibration(calibration, values)
+    for stack, expected in (
+        (Stack('p', gait='crawl', calibration=calibration), ('crawl', '', '')),
+        (Stack('p', policy=Path('/a.onnx'), record=Path('/runs')), ('trot', '/a.onnx', '/runs')),
+    ):
+        specs = processes(tmp_path, stack)
+        settings, robot = controller_of(specs), bridge_of(specs).robot
+        assert (settings.gait.value, settings.policy, settings.record) == expected
+        is_calibrated = stack.calibration is not None
+        assert robot.joints.servos[0].sign == (-1 if is_calibrated else 1)
+        assert robot.estimator.mounting.checked is is_calibrated
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('missing', OURS)
-def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> None:
+def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
     """Whichever package it is."""
-    find = underlay(tmp_path, *(name for name in OURS if name != missing))
-    with pytest.raises(StartError, match='make build'):
-        quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
+    for missing in OURS:
+        find = underlay(tmp_path, *(name for name in OURS if name != missing))
+        with pytest.raises(StartError, match='make build'):
+            quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
