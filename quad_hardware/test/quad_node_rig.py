@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -122,30 +123,26 @@ class Rig(ABC):
 
     def stream(self, positions: list[float], duration: float) -> None:
         """Publish a joint command 50 times a second, as a controller does."""
-        count, sent = round(duration / 0.02), 0
-
-        def send() -> None:
-            nonlocal sent
-            sent += 1
-            self.command(positions)
-
-        timer = self.client.node.create_timer(0.02, send)
-        self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')
-        self.client.node.destroy_timer(timer)
+        self._stream([positions] * round(duration / 0.02))
 
     def swing(self, steps: int) -> None:
         """Publish commands of a trot, 50 times a second, that break off in a step."""
-        count, sent = 7 * steps + 4, 0  # between two steps all feet stand
+        commands = []
+        for tick in range(1, 7 * steps + 5):  # between two steps all feet stand
+            up = 0.3 if tick // 7 % 2 else -0.3
+            thighs = (0.6 + up, 0.6 - up, 0.6 - up, 0.6 + up)
+            commands.append([angle for thigh in thighs for angle in (0.0, thigh, -0.3)])
+        self._stream(commands)
+
+    def _stream(self, commands: list[list[float]]) -> None:
+        rest = deque(commands)
 
         def send() -> None:
-            nonlocal sent
-            sent += 1
-            up = 0.3 if sent // 7 % 2 else -0.3
-            thighs = (0.6 + up, 0.6 - up, 0.6 - up, 0.6 + up)
-            self.command([angle for thigh in thighs for angle in (0.0, thigh, -0.3)])
+            if rest:
+                self.command(rest.popleft())
 
         timer = self.client.node.create_timer(0.02, send)
-        self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')
+        self.client.spin_until(lambda: not rest, TIMEOUT, 'stream of commands')
         self.client.node.destroy_timer(timer)
 
     def status(self, name: str) -> DiagnosticStatus:

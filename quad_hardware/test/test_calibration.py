@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 import math
 from pathlib import Path
 import re
@@ -32,10 +33,7 @@ from quad_hardware.calibration.main import read_parameters, run_calibrate, write
 from quad_hardware.calibration.odometry import Place, way
 from quad_hardware.calibration.wizard import (
     MIN_TURN,
-    moved_motor,
-    prompt_number,
     with_direction,
-    with_limits,
 )
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2
@@ -95,14 +93,16 @@ def walking_robot(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iter
 def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: Path) -> None:
     """It walks, stops, and the scale of before is multiplied by tape over odometry.
 
-    Centimetres would make a scale that the bridge refuses: they are asked for again.
+    It is asked for until it is a number, and one of metres: centimetres would make a scale that
+    the bridge refuses. A comma is a point.
     """
     output = tmp_path / 'found.yaml'
-    script = Script('', '15', '0.15')
+    script = Script('', 'far', '', '-1', 'inf', '15', '0,15')
     command = ['odometry', '--distance', '0.3', '--speed', '0.5', '--output', str(output)]
     assert run_calibrate(command, script) == 0, script.said
     assert walking_robot.velocity.linear.x == 0.0
     assert any('was it in metres?' in text for text in script.said)
+    assert sum('is not a positive number' in text for text in script.said) == 4
     said = float(
         next(line for line in script.said if line.startswith('odometry measured')).split()[2]
     )
@@ -197,29 +197,13 @@ def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> Non
 
 
 @pytest.mark.slow
-def test_a_turn_that_shows_nothing_is_refused() -> None:
-    """A hand that shakes is no direction."""
-    with pytest.raises(CommandError, match=r'motor 11 turned by 3.0 degrees'):
-        with_direction(KNEE, 10.0, 13.0)
-    assert moved_motor({11: 0.0, 12: 0.0}, {11: 1.0, 12: -20.0}) == 12
-    assert moved_motor({11: 0.0}, {11: 1.0}) is None
-
-
-@pytest.mark.slow
-def test_limits_are_measured_within_those_of_the_urdf() -> None:
-    """With a margin to the stop, in either order of the ends."""
-    found = with_limits(KNEE, 40.0, -90.0)
-    assert found.lower == KNEE.lower
-    assert found.upper == pytest.approx(math.radians(38.0))
-    assert with_limits(KNEE, -90.0, 40.0) == found
-    with pytest.raises(CommandError, match='nothing is left'):
-        with_limits(KNEE, 1.0, 2.0)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> None:
-    """Torque off, two places, torque on where it is, and the file has what was found."""
+    """Torque off, four places, torque on where it is, and the file has what was found.
+
+    The limits are the ends of its travel, with a margin to the stop, within those of the URDF;
+    ends that leave nothing between them are measured again.
+    """
     output = tmp_path / 'found.yaml'
     with PtyPeer(tmp_path / 'port', protocol) as peer:
         limp: list[bool] = []
@@ -228,16 +212,21 @@ def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> No
             limp.append(not peer.torque)
             peer.angles[11] = angle
 
-        script = Script('', (lambda: put(10.0), ''), (lambda: put(-15.0), ''), 'y')
-        command = ['joints', '--joint', 'fl_calf_joint', '--output', str(output)]
+        ways = (10.0, -15.0, 1.0, 2.0), (10.0, -15.0, 45.0, -60.0)  # zero, turned, both ends
+        answers = [(partial(put, angle), '') for way in ways for angle in way]
+        script = Script('', *answers, 'y')
+        command = ['joints', '--limits', '--joint', 'fl_calf_joint', '--output', str(output)]
         assert run_calibrate([*command, '--port', str(peer.link)], script) == 0, script.said
-        assert limp == [True, True]
+        assert limp == [True] * 8
         assert peer.torque
         legs = [command for command in peer.commands if 11 in command]
-        assert legs[-1][11] == pytest.approx(-15.0, abs=0.5)
-    joints: Any = read_parameters(output)['joints']
-    assert joints['fl_calf_joint']['sign'] == -1
-    assert joints['fl_calf_joint']['offset'] == pytest.approx(math.radians(10.0), abs=0.01)
+        assert legs[-1][11] == pytest.approx(-60.0, abs=0.5)
+    assert any('nothing is left between' in text for text in script.said)
+    joint: Any = read_parameters(output)['joints']['fl_calf_joint']  # type: ignore[index]
+    assert joint['sign'] == -1
+    assert joint['offset'] == pytest.approx(math.radians(10.0), abs=0.01)
+    assert joint['lower'] == pytest.approx(math.radians(10.0 - 45.0 + 2.0), abs=0.01)
+    assert joint['upper'] == pytest.approx(KNEE.upper, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -257,16 +246,22 @@ def test_who_leaves_gets_torque_back_and_no_file(tmp_path: Path) -> None:
 def test_a_wrong_motor_is_noticed(tmp_path: Path) -> None:
     """Someone moves another joint than asked: it is said which motor turned, and asked again.
 
-    A joint that is skipped is not written as if it had been found.
+    So it is of a turn that shows nothing: a hand that shakes is no direction. A joint that is
+    skipped is not written as if it had been found.
     """
     output = tmp_path / 'found.yaml'
     with PtyPeer(tmp_path / 'port') as peer:
-        script = Script('', '', (lambda: peer.angles.update({21: 30.0}), ''), 'n', 's')
+
+        def turn(*motors: int) -> None:
+            peer.angles.update(dict.fromkeys(motors, peer.angles[11] + 3.0) | {21: 30.0})
+
+        script = Script('', '', (turn, ''), 'n', '', (lambda: turn(11), ''), 's')
         command = ['joints', '--joint', 'fl_calf_joint', '--output', str(output)]
         assert run_calibrate([*command, '--port', str(peer.link)], script) == 1  # skipped
     text = '\n'.join(script.said)
     assert 'motor 21 turned by 30 degrees, not 11' in text
-    assert 'Is this the right joint?' in text
+    assert 'motor 11 turned by 0.0 degrees; at least 8 are needed. Is this the right' in text
+    assert 'motor 11 turned by 3.0 degrees' in text
     assert script.said[-1] == 'every joint was skipped; nothing was written'
     assert not output.exists()
 
@@ -338,14 +333,6 @@ def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
     path.write_text('- a list')
     with pytest.raises(CommandError, match='holds no parameters of hardware_node'):
         write_parameters(path, {})
-
-
-@pytest.mark.slow
-def test_a_number_is_asked_for_until_there_is_one() -> None:
-    """A comma is a point; words, nothing and zero are not."""
-    script = Script('far', '', '-1', 'inf', '0,95')
-    assert prompt_number(script, 'How far?') == 0.95
-    assert len(script.said) == 9
 
 
 @pytest.mark.slow

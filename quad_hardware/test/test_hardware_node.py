@@ -300,23 +300,19 @@ def test_a_timer_that_waited_behind_a_command_counts_nothing() -> None:
 def test_servos_that_still_pull_are_not_said_to_be_without_torque(
     rig: NodeRig, load: float
 ) -> None:
-    """The answer comes of what they report then, and not of what was sent, or of before."""
+    """The answer comes of what they report then, and not of what was sent, or of before.
+
+    The node serves others while it waits for that: of two that ask for torque off, and one that
+    wants it back, none waits for another.
+    """
+    name, off, on = '/hardware_node/torque', SetBool.Request(), SetBool.Request(data=True)
     rig.peer.behaviour.load, rig.peer.behaviour.limp_load = load, 12.0
     rig.receive('/joint_states', 5)
-    answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
+    answer = rig.client.call(SetBool, name, off)
     assert not answer.success
     assert 'still report load' in answer.message
-    assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
-
-
-@on_node
-def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig) -> None:
-    """Of two that ask for torque off, and one that wants it back, none waits for another."""
-    name, off = '/hardware_node/torque', SetBool.Request(data=False)
-    rig.peer.behaviour.limp_load = 12.0
-    rig.client.client_of(SetBool, name)
     answers = [rig.client.call_async(SetBool, name, off) for _ in range(2)]
-    assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
+    assert rig.client.call(SetBool, name, on).success
     rig.client.spin_until(lambda: all(a.done() for a in answers), TIMEOUT, 'answers')
     assert not any(each.result().success for each in answers)
     for each in answers:  # on a busy machine the time for letting go may be over first
@@ -324,7 +320,7 @@ def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     rig.peer.behaviour.limp_load = 0.0
     assert rig.client.call(SetBool, name, off).success
-    assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
+    assert rig.client.call(SetBool, name, on).success
 
 
 @on_node

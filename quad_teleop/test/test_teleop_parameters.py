@@ -79,16 +79,19 @@ def gamepad() -> TeleopGamepad:
     return TeleopGamepad(InjectedDevices())
 
 
-def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> set[str]:
-    """Make a node from a command line, and return the names of its parameters."""
+def make(
+    isolation: Isolation, node: Callable[[], Node], *parameters: str
+) -> tuple[set[str], set[str]]:
+    """Make a node from a command line; return the names of its parameters, and its topics."""
     words = [word for parameter in parameters for word in ('-p', parameter)]
     rclpy.init(args=['test', '--ros-args', *words], domain_id=isolation.domain_id)
     watcher = Node('watcher', use_global_arguments=False)
     try:
         made = node()
         names = set(made.get_parameters_by_prefix(''))
+        topics = dict(made.get_publisher_names_and_types_by_node(made.get_name(), '/'))
         made.destroy_node()
-        return names
+        return names, set(topics)
     finally:
         left = watcher.get_node_names()
         watcher.destroy_node()
@@ -158,17 +161,30 @@ def test_wrong_sources_of_twist_mux_are_refused_by_name(
 
 
 @pytest.mark.parametrize(
-    ('node', 'parameters'),
+    ('node', 'parameters', 'velocities'),
     [
-        (TeleopKeyboard, ['speed:=0.3', 'turn:=1', 'stamped:=true', 'twist:=false']),
-        (gamepad, ['preset:=ps', 'enable_button:=right_trigger', 'turbo_button:=none']),
-        (TwistMux, ['topics.a.topic:=a', 'topics.a.timeout:=1', 'topics.a.priority:=3']),
-        (TwistMux, []),
+        (
+            TeleopKeyboard,
+            ['speed:=0.3', 'turn:=1', 'stamped:=true', 'twist:=false'],
+            ['/cmd_vel_stamped'],
+        ),
+        (
+            gamepad,
+            ['preset:=ps', 'enable_button:=right_trigger', 'turbo_button:=none'],
+            ['/cmd_vel'],
+        ),
+        (
+            TwistMux,
+            ['topics.a.topic:=a', 'topics.a.timeout:=1', 'topics.a.priority:=3'],
+            ['/cmd_vel_out'],
+        ),
+        (TwistMux, [], ['/cmd_vel_out']),
     ],
 )
 def test_good_parameters_are_taken(
-    isolation: Isolation, node: Callable[[], Node], parameters: list[str]
+    isolation: Isolation, node: Callable[[], Node], parameters: list[str], velocities: list[str]
 ) -> None:
     """What the READMEs name is accepted, whole numbers as times and speeds too."""
-    names = make(isolation, node, *parameters)
+    names, topics = make(isolation, node, *parameters)
     assert {parameter.partition(':=')[0] for parameter in parameters} <= names
+    assert [topic for topic in topics if 'cmd_vel' in topic] == velocities
