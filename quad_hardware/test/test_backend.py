@@ -18,13 +18,7 @@ from typing import NamedTuple
 
 import pytest
 
-from quad_description import (
-    movable_joints,
-    Pose,
-    pose_positions,
-    robot_urdf,
-    RobotState,
-)
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf, RobotState
 from quad_hardware import CommandError, NoAnswerError, RecordingError
 from quad_hardware.backend import recorded_in, ReplayedRobot, SerialBackend
 from quad_hardware.estimation import EstimatorSettings, ImuMounting

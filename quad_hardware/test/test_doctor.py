@@ -14,15 +14,9 @@ from processes import executable, RunningProcess
 import pytest
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.doctor import Finding, Severity
+from quad_hardware.doctor import Finding, main, Severity
 from quad_hardware.doctor.graph import check_graph, links_without_place, Observation
-from quad_hardware.doctor.main import (
-    check_environment,
-    check_latency,
-    check_memory,
-    check_port,
-    port_users,
-)
+from quad_hardware.doctor.main import check_latency, check_memory, check_port, port_users
 from quad_hardware.link import latency_timer
 from quad_hardware.protocol import V1
 from quad_pty_peer import PtyPeer
@@ -99,7 +93,7 @@ def test_the_environment(
     environment: dict[str, str], subject: str, severity: Severity, words: str
 ) -> None:
     """Unsourced shells, domains that are none, and domains that nobody else is in."""
-    finding = found(check_environment(environment), subject)
+    finding = found(main.check_environment(environment), subject)
     assert finding.severity is severity
     assert words in str(finding)
 

@@ -60,15 +60,10 @@ from quad_hardware.report import (
 ASKED, SENT = 10.0, 10.01  # [s]
 LATE = ASKED + TIMEOUT
 LIMP = dict.fromkeys(LEG_MOTORS, 0.0)
-WIRE = 0.001  # [s]
-
-
-def report_of(loads: Mapping[int, float] | None, arrival: float) -> Report:
-    """Return a report of loads [%]."""
-    return Report(
-        arrival=arrival, wire_time=WIRE, attitude=(0.0, 0.0, 0.0), acceleration=None,
-        positions={}, velocities={}, loads=loads,
-    )  # fmt: skip
+STATE = Report(
+    arrival=0.0, wire_time=0.00127, attitude=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, 9.8),
+    positions=LIMP, velocities=LIMP,
+)  # fmt: skip
 
 
 WEAK = {motor: 0.0 for motor in LEG_MOTORS if motor != 11}  # one does not report
@@ -95,7 +90,7 @@ def test_a_report_after_torque_off_shows_what_became_of_it(
 
     What was not sent let no servo go, whatever is reported meanwhile.
     """
-    report = report_of(loads, SENT + DELAY + 2.0 * WIRE)
+    report = replace(STATE, loads=loads, arrival=SENT + DELAY + 2.0 * STATE.wire_time)
     assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, report.arrival) is found
     assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, LATE) is in_the_end
     assert check_torque_off(report, LEG_MOTORS, ASKED, None, report.arrival) is None
@@ -103,10 +98,10 @@ def test_a_report_after_torque_off_shows_what_became_of_it(
     assert in_the_end.succeeded is (in_the_end in {R.LIMP, R.NOT_REPORTED})
 
 
-@given(st.floats(-1.0, DELAY + 0.5 * WIRE), st.sampled_from([LIMP, None]))
+@given(st.floats(-1.0, DELAY + 0.5 * STATE.wire_time), st.sampled_from([LIMP, None]))
 def test_a_report_of_before_shows_nothing(after: float, loads: Mapping[int, float] | None) -> None:
     """It was made while the servos held, or may have been on its way when they let go."""
-    for report in (report_of(loads, SENT + after), None):
+    for report in (replace(STATE, loads=loads, arrival=SENT + after), None):
         assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, SENT + 0.1) is None
         assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, LATE) is R.UNKNOWN
     assert not R.UNSENT.succeeded
@@ -114,10 +109,6 @@ def test_a_report_of_before_shows_nothing(after: float, loads: Mapping[int, floa
 
 ANGLES = st.floats(-3.1, 3.1)
 ROTATIONS = st.builds(from_rpy, ANGLES, st.floats(-1.5, 1.5), ANGLES)
-STATE = Report(
-    arrival=0.0, wire_time=0.00127, attitude=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, 9.8),
-    positions=LIMP, velocities=LIMP,
-)  # fmt: skip
 URDF = robot_urdf('lite')
 
 

@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from quad_description import (
-    FootPose,
-    movable_joints,
-    OdometryState,
-    quadruped,
-    robot_urdf,
-)
+from quad_description import FootPose, movable_joints, OdometryState, quadruped, robot_urdf
 from quad_description.rotations import from_rpy, IDENTITY, Quaternion, yaw_of
 from quad_hardware import CommandError
 from quad_hardware.estimation import (
@@ -160,15 +154,14 @@ def yaws(reports: Iterable[tuple[float, float | None, float]]) -> list[float]:
 
 @pytest.mark.parametrize('clock', [True, False], ids=['board with a clock', 'board without'])
 def test_a_board_that_begins_anew_turns_nobody(clock: bool) -> None:
-    """Its yaw begins at zero again; that of /odom goes on from where it was (REP 105)."""
+    """Its yaw begins at zero again; that of /odom goes on from where it was (REP 105).
+
+    A clock that went on shows that a robot was turned while its cable was out.
+    """
     before = [(tick * PERIOD, 30.0 + tick * PERIOD, 50.0 + tick) for tick in range(20)]
     after = [(2.0 + tick * PERIOD, 0.1 + tick * PERIOD, float(tick)) for tick in range(20)]
     found = yaws((at, device if clock else None, yaw) for at, device, yaw in (*before, *after))
     assert np.degrees(found) == pytest.approx([*range(20), *range(19, 39)], abs=1e-6)
-
-
-def test_a_robot_that_was_turned_while_its_cable_was_out_is_turned() -> None:
-    """The clock of the board shows that its yaw still counts from the same heading."""
     found = yaws([(0.0, 10.0, 0.0), (0.02, 10.02, 0.0), (3.0, 13.0, 90.0), (3.02, 13.02, 90.0)])
     assert np.degrees(found) == pytest.approx([0.0, 0.0, 90.0, 90.0])
 

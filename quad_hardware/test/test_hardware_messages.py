@@ -29,14 +29,7 @@ from quad_description import (
     robot_urdf,
     RobotState,
 )
-from quad_description.rotations import (
-    from_rpy,
-    IDENTITY,
-    multiply,
-    rotate,
-    Vector,
-    yaw_of,
-)
+from quad_description.rotations import from_rpy, IDENTITY, multiply, rotate, Vector, yaw_of
 from quad_description.rotations import Quaternion as Rotation
 from quad_hardware.commander import CommandCounters
 from quad_hardware.estimation import Estimator, EstimatorSettings, UNCHECKED_DEVIATION
@@ -80,21 +73,19 @@ def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Fra
     assert yaw_of(level) == pytest.approx(yaw_of(rotation))
 
 
-def pose(transform: Transform) -> tuple[Vector, Rotation]:
-    """Translation and rotation as tuples."""
-    t, r = transform.translation, transform.rotation
-    return (t.x, t.y, t.z), (r.x, r.y, r.z, r.w)
-
-
 def test_joints_keep_their_order() -> None:
     """Each velocity stands beside its name; efforts, and joints not measured, are left out."""
     joints = JointSample((0.1, 0.5, 0.2), (1.0, 0.0, 2.0), unmeasured=(1,))
     template, numbers = robot_topics.joint_states(('b', 'arm', 'a'), joints)
     message = template.message(STAMP, numbers)
-    assert message.name == ['b', 'a']
-    assert list(message.position) == [0.1, 0.2]
-    assert list(message.velocity) == [1.0, 2.0]
-    assert list(message.effort) == []
+    found = (message.name, *map(list, (message.position, message.velocity, message.effort)))
+    assert found == (['b', 'a'], [0.1, 0.2], [1.0, 2.0], [])
+
+
+def pose(transform: Transform) -> tuple[Vector, Rotation]:
+    """Translation and rotation as tuples."""
+    t, r = transform.translation, transform.rotation
+    return (t.x, t.y, t.z), (r.x, r.y, r.z, r.w)
 
 
 def imu(sample: ImuSample) -> Imu:
@@ -189,14 +180,7 @@ def test_an_unknown_charge_is_nan() -> None:
     assert known.voltage == pytest.approx(7.4)
 
 
-def link_status(**changes: object) -> LinkStatus:
-    """A link that runs, but for what is changed."""
-    status = LinkStatus(
-        LinkState.RUNNING, 'reports arrive', 'v2', parser=ParserCounters(frames=1000)
-    )
-    return replace(status, **changes)  # type: ignore[arg-type]
-
-
+RUNNING = LinkStatus(LinkState.RUNNING, 'reports arrive', 'v2', parser=ParserCounters(frames=1000))
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -212,9 +196,9 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
         ({'latency': 0.016}, WARN),
     ],
 )
-def test_the_level_of_the_link(changes: dict[str, object], level: bytes) -> None:
+def test_the_level_of_the_link(changes: dict[str, Any], level: bytes) -> None:
     """A slow adapter is a warning, a silent robot stale, none an error."""
-    status = LinkDiagnostic().describe('hardware_node', '/dev/x', link_status(**changes))
+    status = LinkDiagnostic().describe('node', '/dev/x', replace(RUNNING, **changes))
     assert status.level == level
 
 
@@ -224,7 +208,7 @@ def test_damage_is_reported_as_long_as_it_lasts() -> None:
     levels = []
     for frames, damaged in [(5000, 0), (5050, 20), (5100, 20), (10, 0), (60, 30)]:
         counters = ParserCounters(frames=frames, bad_checksum=damaged)
-        status = link.describe('hardware_node', '/dev/x', link_status(parser=counters))
+        status = link.describe('node', '/dev/x', replace(RUNNING, parser=counters))
         levels.append(status.level)
     assert levels == [OK, WARN, OK, OK, WARN]
     assert '30 damaged and 50 good frames lately' in status.message

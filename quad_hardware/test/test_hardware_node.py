@@ -104,6 +104,7 @@ def on_node(test: Callable[..., None]) -> Callable[..., None]:
 HOME = [0.0] * 12
 POSE = [0.0, 0.6, -0.3] * 4
 LARGEST_STEP = math.degrees(LimiterSettings().max_joint_speed * MAX_PERIOD)  # [deg]
+LYING = list(pose_positions(Pose.LIE).values())
 LEGS_ORDER = [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31]
 
 
@@ -232,23 +233,24 @@ def test_silence_holds_the_servos(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+def is_folded(rig: NodeRig) -> bool:
+    """Return whether the servos are in the lying pose."""
+    angles = [math.radians(rig.peer.angles[motor]) for motor in LEGS_ORDER]
+    return bool(angles == pytest.approx(LYING, abs=0.002))
+
+
 @on_node
 def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -> None:
     """The legs fold softly and diagnostics is in error, until somebody commands again."""
     rig.swing(7)
     rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
-    lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
-    rig.client.spin_until(
-        lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
-        TIMEOUT,
-        'lying pose',
-    )
+    rig.client.spin_until(lambda: is_folded(rig), TIMEOUT, 'lying pose')
     assert rig.largest_step() <= LARGEST_STEP + 0.01
     rig.receive('/joint_states', 10)
     count = len(rig.peer.commands)
     rig.receive('/joint_states', 10)
     assert len(rig.peer.commands) == count
-    rig.stream(list(pose_positions(Pose.LIE).values()), 0.1)
+    rig.stream(LYING, 0.1)
     rig.wait_for_status('joint commands', DiagnosticStatus.OK, 'received')
 
 
@@ -279,13 +281,8 @@ def test_a_node_that_ends_in_motion_folds_the_legs_first(
         time.sleep(0.1)
         rig.peer.behaviour.silent = False
         assert rig.node.wait() == 0
-        lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
         # on a busy machine the robot takes its last frames later than the node ends
-        rig.client.spin_until(
-            lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
-            TIMEOUT,
-            f'folded legs after {rig.node.output}',
-        )
+        rig.client.spin_until(lambda: is_folded(rig), TIMEOUT, f'end of {rig.node.output}')
 
 
 def test_a_timer_that_waited_behind_a_command_counts_nothing() -> None:

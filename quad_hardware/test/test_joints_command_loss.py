@@ -33,11 +33,6 @@ STANDING = [STAND[name] for name in NAMES]
 LYING = [pose_positions(Pose.LIE)[name] for name in NAMES]
 
 
-def raised(targets: Sequence[float]) -> Sequence[str]:
-    """Feet that are in the air [names]."""
-    return raised_feet(ROBOT.feet(targets))
-
-
 def trot(tick: int, lift: float) -> list[float]:
     """Targets of a robot of which a diagonal pair of legs is lifted by an angle [rad]."""
     pair = ('fl', 'br') if tick // 7 % 2 else ('fr', 'bl')
@@ -58,7 +53,8 @@ class Line:
         self.place: dict[str, float] = dict(STAND)  # where the legs are seen
         self.commander = JointCommander(
             joints, LimiterSettings(command_loss=reaction),
-            raised=raised, send=self._send, waits=lambda: False,
+            raised=lambda targets: raised_feet(ROBOT.feet(targets)),
+            send=self._send, waits=lambda: False,
             obstacle=lambda: self.obstacle, warn=self.warned.append,
         )  # fmt: skip
 

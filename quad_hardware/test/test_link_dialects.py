@@ -313,12 +313,11 @@ def test_half_a_report_is_no_report() -> None:
     """An IMU answer without the angles of its period gives nothing."""
     dialect = V1Dialect(0.0)
     dialect.step(0.0)  # the speed of the servos
-    motors = dialect.step(0.01)
-    (request,) = StreamParser(V1, HOST_KINDS).feed(motors.send)
+    (request,) = StreamParser(V1, HOST_KINDS).feed(dialect.step(0.01).send)
     assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.011) is None
     assert dialect.counters.unusable == 1
-    assert dialect.handle_frame(answer(request), 0.012) is None
-    assert dialect.handle_frame(answer(request), 0.012) is None  # asked once, answered twice
+    for _ in range(2):  # asked once, answered twice
+        assert dialect.handle_frame(answer(request), 0.012) is None
     assert dialect.counters.unusable == 2
 
 

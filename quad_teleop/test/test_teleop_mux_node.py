@@ -55,6 +55,14 @@ def forward(x: float) -> Twist:
     return message
 
 
+def locked(messages: list[Any]) -> bool:
+    """Return whether the lock is in the newest diagnostics."""
+    if not messages:
+        return False
+    values = {entry.key: entry.value for entry in messages[-1].status[0].values}
+    return bool(values['lock e_stop'][:6] == 'locked' and values['current priority'] == '255')
+
+
 def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -> None:
     """The shipped file: keyboard over planner, a lock over both, and a zero after silence."""
     with mux(isolation, '--params-file', str(CONFIG), '-r', 'cmd_vel_out:=cmd_vel') as process:
@@ -78,7 +86,8 @@ def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -
         stop.publish(Bool(data=True))
         wait_for(client, received, 0.0)
         keyboard.publish(forward(0.5))
-        client.spin_until(lambda: bool(diagnostic(client)), TEST_TIMEOUT, 'diagnostics')
+        messages = client.listen(DiagnosticArray, '/diagnostics')
+        client.spin_until(lambda: locked(messages), TEST_TIMEOUT, 'lock in the diagnostics')
         assert received[-1].linear.x == 0.0
         stop.publish(Bool(data=False))
         client.spin_until(
@@ -87,15 +96,6 @@ def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -
             'keyboard after the lock',
         )
         assert process.stop() == 0
-
-
-def diagnostic(client: RosClient) -> list[Any]:
-    """Listen to the diagnostics until the lock is in them."""
-    messages = client.listen(DiagnosticArray, '/diagnostics')
-    client.spin_until(lambda: bool(messages), TEST_TIMEOUT, 'diagnostics')
-    values = {entry.key: entry.value for entry in messages[-1].status[0].values}
-    locked = values['lock e_stop'].startswith('locked') and values['current priority'] == '255'
-    return messages if locked else []
 
 
 def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:

@@ -21,7 +21,12 @@ from operator_input import OperatorInputError
 from quad_msgs.srv import SetMode
 from quad_teleop import Mode, TeleopError
 from quad_teleop.motion import RobotRequest
-from quad_teleop.nodes.teleop import RobotLink, TeleopGamepad, TeleopKeyboard
+from quad_teleop.nodes.teleop import (
+    DISCOVERY_TIMEOUT,
+    RobotLink,
+    TeleopGamepad,
+    TeleopKeyboard,
+)
 from quad_teleop.nodes.twist_mux import TwistMux
 
 
@@ -29,7 +34,10 @@ from quad_teleop.nodes.twist_mux import TwistMux
 def test_each_stop_is_sent_and_ends_what_was_requested_before(
     isolation: Isolation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A mode that still waits for its service is not sent later; answers are shown once."""
+    """A mode that still waits for its service is not sent later; answers are shown once.
+
+    What waited in vain is shown, with the remedy, and not sent later, either.
+    """
     clock = SimpleNamespace(monotonic=lambda: 0.0)
     monkeypatch.setattr('quad_teleop.nodes.teleop.time', clock)
     shown: list[str] = []
@@ -63,10 +71,13 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
         client.spin_until(lambda: stopped(3), TEST_TIMEOUT, 'third stop')
         assert shown == ['stop: as asked'] * 2
 
+        robot.handle(Mode.STAND, 0.4)
+        robot.serve(0.5 + DISCOVERY_TIMEOUT)
+        assert shown[-1].startswith('stand: no service /set_mode; is controller_node running')
         client.node.create_service(SetMode, 'set_mode', serve)
         wait_for_service('set_mode')
-        robot.serve(0.4)
-        robot.handle(Mode.STAND, 0.5)
+        robot.serve(10.4)
+        robot.handle(Mode.STAND, 10.5)
         client.spin_until(lambda: robot.mode is Mode.STAND, TEST_TIMEOUT, 'stand')
         assert handled == ['stop'] * 3 + ['stand']
 
@@ -163,28 +174,17 @@ def test_wrong_sources_of_twist_mux_are_refused_by_name(
 @pytest.mark.parametrize(
     ('node', 'parameters', 'velocities'),
     [
-        (
-            TeleopKeyboard,
-            ['speed:=0.3', 'turn:=1', 'stamped:=true', 'twist:=false'],
-            ['/cmd_vel_stamped'],
-        ),
-        (
-            gamepad,
-            ['preset:=ps', 'enable_button:=right_trigger', 'turbo_button:=none'],
-            ['/cmd_vel'],
-        ),
-        (
-            TwistMux,
-            ['topics.a.topic:=a', 'topics.a.timeout:=1', 'topics.a.priority:=3'],
-            ['/cmd_vel_out'],
-        ),
-        (TwistMux, [], ['/cmd_vel_out']),
+        (TeleopKeyboard, 'speed:=0.3 turn:=1 stamped:=true twist:=false', '/cmd_vel_stamped'),
+        (gamepad, 'preset:=ps enable_button:=right_trigger turbo_button:=none', '/cmd_vel'),
+        (TwistMux, 'topics.a.topic:=a topics.a.timeout:=1 topics.a.priority:=3', '/cmd_vel_out'),
+        (TwistMux, '', '/cmd_vel_out'),
     ],
 )
 def test_good_parameters_are_taken(
-    isolation: Isolation, node: Callable[[], Node], parameters: list[str], velocities: list[str]
+    isolation: Isolation, node: Callable[[], Node], parameters: str, velocities: str
 ) -> None:
     """What the READMEs name is accepted, whole numbers as times and speeds too."""
-    names, topics = make(isolation, node, *parameters)
-    assert {parameter.partition(':=')[0] for parameter in parameters} <= names
-    assert [topic for topic in topics if 'cmd_vel' in topic] == velocities
+    words = parameters.split()
+    names, topics = make(isolation, node, *words)
+    assert {word.partition(':=')[0] for word in words} <= names
+    assert [topic for topic in topics if 'cmd_vel' in topic] == [velocities]

@@ -89,11 +89,3 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
         (0.165, 0.165, 0.0),
         (0.0, 0.0, 0.66),
     }
-
-
-def test_nobody_there(pane: Pane) -> None:
-    """Without a controller the screen says so, for the velocities and for the modes."""
-    pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
-    pane.wait_for('no subscriber')
-    pane.press('1')
-    pane.wait_for(r'stand: no service /set_mode; is controller_node running')
