@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 
+from model_robots import ready, robot
 import numpy as np
 import pinocchio as pin
 
 from arm_model import Array, JointLimits, Pose, RobotModel, RobotState
 from arm_servo import (
+    CoreSettings,
     DisplacementRequest,
     Execution,
     JogRequest,
@@ -20,6 +22,7 @@ from arm_servo import (
     Limiter,
     MotionCore,
     MotionReport,
+    Outcome,
     PauseRequest,
     Phase,
     PoseCommand,
@@ -145,6 +148,28 @@ def follow_to_the_end(
             return states
         states.append(core.step(step * STREAM_PERIOD, STREAM_PERIOD).state)
     raise AssertionError(f'the trajectory is not done after {longest} s')
+
+
+def core_of(
+    name: str, settings: CoreSettings | None = None, at: Sequence[float] | Array | None = None
+) -> MotionCore:
+    """Return a core of a robot at rest: in its pose to start from, or where it is put."""
+    core = MotionCore(robot(name), settings)
+    core.reset(ready(name) if at is None else at)
+    return core
+
+
+def goal_to(
+    core: MotionCore, positions: Sequence[float] | Array, time: float = 2.0, age: float = 0.0
+) -> TrajectoryGoal:
+    """Return a trajectory of one point."""
+    return TrajectoryGoal(core.model.joints, [GoalPoint(time, tuple(positions))], age=age)
+
+
+def ending(execution: Execution) -> Outcome:
+    """Return how a trajectory has ended."""
+    assert execution.ending is not None
+    return execution.ending
 
 
 TIMEOUT = 0.1  # time for which a jog counts in [s]

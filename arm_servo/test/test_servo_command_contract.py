@@ -9,7 +9,7 @@ a stop is put between any two of them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
@@ -88,12 +88,34 @@ LATER = st.sampled_from([0, 0, 0, 5, 20, 60])
 """Cycles between the steps of the command and the stop: 0 for while it is prepared."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Begun:
+    """What was under way when a stop came."""
+
+    command: MotionCommand | None
+    speed: float  # [rad/s], with what it comes to while the acceleration is taken back
+    place: Array
+    is_idle: bool  # whether nothing moves the arm yet
+
+
 class Bench:
     """An arm, the worker of its commands, and what has happened since the stop."""
 
-    def __init__(self, arm: Drives | Elsewhere, worker: SteppedWorker) -> None:
-        self.arm, self.gateway, self._worker = arm, arm.gateway, worker
+    def __init__(self, at_topics: bool = False) -> None:
+        self._worker = SteppedWorker()
+        self.arm: Drives | Elsewhere
+        if at_topics:
+            self.arm = Elsewhere(worker=self._worker)
+        else:
+            self.arm = Drives(worker=self._worker).following(0)
+        self.gateway, self.limits = self.arm.gateway, self.arm.gateway.model.limits
         self.arm.run(3)
+
+    @property
+    def drives(self) -> Drives:
+        """The drives of this process."""
+        assert isinstance(self.arm, Drives)
+        return self.arm
 
     @property
     def at(self) -> Array:
@@ -102,6 +124,13 @@ class Bench:
         assert point is not None
         return point.state.position
 
+    @property
+    def where(self) -> Array:
+        """Where the drives were sent."""
+        if isinstance(self.arm, Elsewhere):
+            return np.array(self.arm.at)
+        return np.array([axis.setpoint for axis in self.drives.axes])
+
     def take(self, steps: list[str]) -> None:
         """Step the cycle and the worker."""
         for step in steps:
@@ -109,6 +138,23 @@ class Bench:
                 self.arm.run()
             else:
                 self._worker.run()
+
+    def begin(self, kind: str, steps: list[str], later: int) -> Begun:
+        """Give a command and let it go some way."""
+        command = COMMANDS[kind](self.gateway, self.arm.now, self.at)
+        self.take(steps)
+        before = self.where
+        for _ in range(later):
+            self.take(['work'])
+            before = self.where
+            self.take(['cycle'])
+        snapshot = self.gateway.snapshot
+        assert snapshot.set_point is not None
+        state = snapshot.set_point.state
+        coming = state.acceleration**2 / (2.0 * self.limits.jerk)
+        speed = float((np.abs(state.velocity) + coming).max())
+        speed = max(speed, float(np.abs(self.where - before).max()) / PERIOD)
+        return Begun(command, speed, self.where, snapshot.source is Source.NONE)
 
     def settle(self) -> list[Array]:
         """Run until all is prepared and at rest; return where the arm was in each cycle."""
@@ -122,49 +168,15 @@ class Bench:
                 return path
         raise AssertionError('the arm does not come to rest')
 
-    @property
-    def where(self) -> Array:
-        """Where the drives were sent."""
-        if isinstance(self.arm, Elsewhere):
-            return np.array(self.arm.at)
-        return np.array([axis.setpoint for axis in self.arm.axes])
-
-
-def bench(at_topics: bool = False) -> Bench:
-    """Return an arm that follows."""
-    worker = SteppedWorker()
-    if at_topics:
-        return Bench(Elsewhere(worker=worker), worker)
-    drives = Drives(worker=worker)
-    drives.attach()
-    return Bench(drives, worker)
-
-
-def stays_at_rest(path: list[Array], limits: Array, speed: float) -> None:
-    """Make sure that the arm only brakes from the stop on, and rests at last."""
-    speeds = np.abs(np.diff(np.array(path), axis=0)) / PERIOD
-    # what was in this very cycle still counts; then nothing gets faster
-    assert speeds.max() <= 1.1 * speed + 2.0 * float(limits.max()) * PERIOD + 1e-9
-
-
-def run_to_stop(
-    arm: Bench, kind: str, steps: list[str], later: int
-) -> tuple[MotionCommand | None, float, bool]:
-    """Give a command and let it go some way; return it, the speed, and whether it stands still."""
-    command = COMMANDS[kind](arm.gateway, arm.arm.now, arm.at)
-    arm.take(steps)
-    before = arm.where
-    for _ in range(later):
-        arm.take(['work'])
-        before = arm.where
-        arm.take(['cycle'])
-    snapshot = arm.gateway.snapshot
-    assert snapshot.set_point is not None
-    state, limits = snapshot.set_point.state, arm.gateway.model.limits
-    coming = state.acceleration**2 / (2.0 * limits.jerk)  # while the acceleration is taken back
-    speed = float((np.abs(state.velocity) + coming).max())
-    speed = max(speed, float(np.abs(arm.where - before).max()) / PERIOD)
-    return command, speed, snapshot.source is Source.NONE
+    def only_brakes(self, begun: Begun) -> None:
+        """Make sure that the arm only brakes from the stop on, and rests at last."""
+        path = self.settle()
+        speeds = np.abs(np.diff(np.array(path), axis=0)) / PERIOD
+        # what was in this very cycle still counts; then nothing gets faster
+        more = 2.0 * float(self.limits.acceleration.max()) * PERIOD
+        assert speeds.max() <= 1.1 * begun.speed + more + 1e-9
+        if begun.is_idle:
+            assert np.abs(path[-1] - begun.place).max() == 0.0
 
 
 @given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER)
@@ -175,18 +187,14 @@ def run_to_stop(
 @settings(max_examples=30, deadline=None)
 def test_a_pause_is_never_overtaken(kind: str, steps: list[str], later: int) -> None:
     """``~/pause``: the arm rests; a trajectory goes on with ``~/resume``, nothing before it."""
-    arm = bench()
-    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
-    begin = arm.where
+    arm = Bench()
+    begun = arm.begin(kind, steps, later)
     arm.gateway.command(PauseRequest())
-    path = arm.settle()
-    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
-    if is_idle:
-        assert np.abs(path[-1] - begin).max() == 0.0
+    arm.only_brakes(begun)
     arm.gateway.command(PauseRequest(is_paused=False))
     arm.take(['cycle', 'work'] * 10)
-    if command is not None and kind in TRAJECTORIES:
-        assert command.execution is not None, command.future.exception()
+    if begun.command is not None and kind in TRAJECTORIES:
+        assert begun.command.execution is not None, begun.command.future.exception()
 
 
 @given(st.sampled_from(sorted(JOGS)), STEPS)
@@ -195,33 +203,13 @@ def test_a_pause_is_never_overtaken(kind: str, steps: list[str], later: int) -> 
 @settings(max_examples=30, deadline=None)
 def test_a_pause_that_ends_at_once_counts(kind: str, steps: list[str]) -> None:
     """``~/pause`` and ``~/resume`` before a jog has begun: it does not begin afterwards."""
-    arm = bench()
-    command, _, is_idle = run_to_stop(arm, kind, steps, 0)
-    assume(is_idle)
-    begin = arm.where
+    arm = Bench()
+    begun = arm.begin(kind, steps, 0)
+    assume(begun.is_idle)
     arm.gateway.command(PauseRequest())
     arm.gateway.command(PauseRequest(is_paused=False))
-    path = arm.settle()
-    assert np.abs(path[-1] - begin).max() == 0.0
-    assert command is None or command.future.done()
-
-
-@given(st.sampled_from(sorted(JOGS)), STEPS, LATER)
-@example('displacement', ['cycle'], 0)
-@example('displacement', ['cycle', 'work'], 0)
-@settings(max_examples=30, deadline=None)
-def test_a_pause_of_the_servo_is_never_overtaken(kind: str, steps: list[str], later: int) -> None:
-    """``~/pause_servo``: whatever was commanded before it does not move the arm after it."""
-    arm = bench()
-    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
-    begin = arm.where
-    arm.gateway.command(StopRequest('the servo was paused', JOGGING))
-    path = arm.settle()
-    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
-    if is_idle:
-        assert np.abs(path[-1] - begin).max() == 0.0
-    assert arm.gateway.snapshot.source is Source.NONE
-    assert command is None or command.future.done()
+    arm.only_brakes(begun)
+    assert begun.command is None or begun.command.future.done()
 
 
 @given(st.sampled_from([*sorted(TRAJECTORIES), 'displacement']), STEPS, LATER, st.booleans())
@@ -230,19 +218,18 @@ def test_a_cancel_is_never_overtaken(
     kind: str, steps: list[str], later: int, jogged: bool
 ) -> None:
     """A goal that was canceled does not move the arm, however far it had come."""
-    arm = bench()
+    arm = Bench()
     if jogged:  # then a long trajectory lets the arm come to rest first
         jog(arm.gateway, {arm.gateway.model.joints[0]: 0.3}, arm.arm.now, 0.3)
         arm.take(['cycle'] * 10)
-    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    begun = arm.begin(kind, steps, later)
+    command = begun.command
     assert command is not None
-    begin = arm.where
     arm.gateway.cancel(command, 'canceled')
-    path = arm.settle()
-    if not jogged:
-        stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
-        if is_idle:
-            assert np.abs(path[-1] - begin).max() == 0.0
+    if jogged:
+        arm.settle()
+    else:
+        arm.only_brakes(begun)
     assert arm.gateway.snapshot.source is Source.NONE
     assert command.future.done()
     if command.execution is not None:
@@ -251,60 +238,56 @@ def test_a_cancel_is_never_overtaken(
         assert command.execution.ending.canceled or is_arrived
 
 
-@pytest.mark.parametrize('is_disabled', [False, True])
+def pause_servo(arm: Bench, _steps: list[str]) -> None:
+    """Stop jogs and displacements, as ``~/pause_servo`` does."""
+    arm.gateway.command(StopRequest('the servo was paused', JOGGING))
+
+
+def halt(arm: Bench, steps: list[str]) -> None:
+    """Halt a drive, as its ``~/halt`` does, and take it back some steps later."""
+    arm.drives.source.released(arm.drives.axes[2].name, Refusal(RefusalCause.HALTED))
+    arm.take(['cycle', *steps])  # the cycle sees it
+    arm.drives.attach()
+
+
+def disable(arm: Bench, steps: list[str]) -> None:
+    """Disable a drive, and enable it some steps later."""
+    axis, disabled = arm.drives.axes[2], Refusal(RefusalCause.NOT_ENABLED)
+    arm.drives.axes[2] = replace(axis, followable=False, refusal=disabled, velocity=0.0)
+    arm.take(['cycle', *steps])
+    arm.drives.axes[2] = replace(axis, velocity=0.0)
+    arm.drives.attach()
+
+
+def end(arm: Bench, _steps: list[str]) -> None:
+    """End the program, as Ctrl-C does."""
+    assert isinstance(arm.arm, Elsewhere)
+    arm.arm.cycle.closing = 'the program ends'
+
+
+@pytest.mark.parametrize('stop', [pause_servo, halt, disable, end])
 @given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, STEPS)
 @example('displacement', ['cycle'], 0, ['cycle'])
 @example('displacement', ['cycle', 'work'], 0, ['cycle'])
 @example('trajectory', ['cycle', 'work'], 0, ['cycle'])
 @example('trajectory', ['cycle'], 0, ['cycle', 'cycle'])
 @settings(max_examples=20, deadline=None)
-def test_a_halt_is_never_overtaken(
-    is_disabled: bool, kind: str, steps: list[str], later: int, halted: list[str]
+def test_a_stop_is_never_overtaken(
+    stop: Callable[[Bench, list[str]], None],
+    kind: str,
+    steps: list[str],
+    later: int,
+    halted: list[str],
 ) -> None:
-    """``~/halt`` or a disable of one drive: back again, nothing from before moves the arm."""
-    arm = bench()
-    drives = arm.arm
-    assert isinstance(drives, Drives)
-    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
-    begin = arm.where
-    healthy = drives.axes[2]
-    if is_disabled:
-        drives.axes[2] = replace(
-            healthy, followable=False, refusal=Refusal(RefusalCause.NOT_ENABLED), velocity=0.0
-        )
-    else:
-        drives.source.released(healthy.name, Refusal(RefusalCause.HALTED))
-    drives.run()  # the cycle sees it
-    arm.take(halted)
-    if is_disabled:
-        drives.axes[2] = replace(healthy, velocity=0.0)
-    drives.attach()
-    path = arm.settle()
-    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
-    if is_idle:
-        assert np.abs(path[-1] - begin).max() == 0.0
+    """Whatever was commanded before it does not move the arm after it, also back again."""
+    assume(stop is not pause_servo or kind in JOGS)
+    arm = Bench(at_topics=stop is end)
+    begun = arm.begin(kind, steps, later)
+    stop(arm, halted)
+    arm.only_brakes(begun)
     assert arm.gateway.snapshot.source is Source.NONE
-    assert command is None or command.future.done()
-
-
-@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER)
-@settings(max_examples=20, deadline=None)
-def test_the_end_of_the_program_is_never_overtaken(
-    kind: str, steps: list[str], later: int
-) -> None:
-    """Ctrl-C: the arm comes to rest, and nothing begins any more."""
-    arm = bench(at_topics=True)
-    topics = arm.arm
-    assert isinstance(topics, Elsewhere)
-    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
-    begin = arm.where
-    topics.cycle.closing = 'the program ends'
-    path = arm.settle()
-    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
-    if is_idle:
-        assert np.abs(path[-1] - begin).max() == 0.0
-    assert topics.cycle.at_rest
-    assert command is None or command.future.done()
+    assert begun.command is None or begun.command.future.done()
+    assert isinstance(arm.arm, Drives) or arm.arm.cycle.at_rest
 
 
 def goes_on(path: Array, limits: Array) -> None:
@@ -317,13 +300,13 @@ def goes_on(path: Array, limits: Array) -> None:
 @example('long trajectory', ['cycle', 'work', 'cycle'], 0, 'jog', ['cycle'])
 @example('stamped trajectory', ['cycle'], 0, 'displacement', ['cycle'])
 @example('displacement', ['cycle', 'work'], 0, 'twist', ['cycle'])
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_the_newest_of_two_commands_counts(
     older: str, steps: list[str], later: int, newer: str, more: list[str]
 ) -> None:
     """Every kind at every moment of every other: none takes the arm from a newer one."""
-    arm = bench()
-    first, *_ = run_to_stop(arm, older, steps, later)
+    arm = Bench()
+    first = arm.begin(older, steps, later).command
     arm.take(['cycle'])
     second = COMMANDS[newer](arm.gateway, arm.arm.now, arm.at)
     arm.take(more)
@@ -331,25 +314,19 @@ def test_the_newest_of_two_commands_counts(
     for _ in range(60):
         arm.take(['work', 'cycle'])
         source = arm.gateway.snapshot.source
-        if newer in {'twist', 'jog', 'pose'}:
+        if second is None:
             assert source is Source.JOG
             continue
-        assert second is not None
         is_newer = second.motion is not None
         assert is_newer or not was_newer
         was_newer = is_newer
         if is_newer and source is not Source.NONE:
             kind = Source.TRAJECTORY if newer in TRAJECTORIES else Source.TARGET
             assert source is kind
-    if newer in JOGS and newer != 'displacement':
-        assert first is None or first.ended.done()
-    else:
-        assert second is not None
-        assert second.motion is not None, second.future.exception()
-        if first is not None and older != newer:
-            assert first.ended.done()
-    assert isinstance(arm.arm, Drives)
-    goes_on(np.array(arm.arm.path), arm.gateway.model.limits.acceleration)
+    assert second is None or second.motion is not None, second.future.exception()
+    if first is not None and older != newer:
+        assert first.ended.done()
+    goes_on(np.array(arm.drives.path), arm.limits.acceleration)
 
 
 @given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, st.booleans())
@@ -362,9 +339,8 @@ def test_a_command_of_nothing_changes_nothing(
     assume(not (is_displaced and kind in {'displacement', *TRAJECTORIES}))
     paths = []
     for is_disturbed in (False, True):
-        arm = bench()
-        assert isinstance(arm.arm, Drives)
-        run_to_stop(arm, kind, steps, later)
+        arm = Bench()
+        arm.begin(kind, steps, later)
         for _ in range(30):
             if is_disturbed and is_displaced:
                 move_by(arm.gateway, {arm.gateway.model.joints[0]: 0.0})
@@ -372,7 +348,7 @@ def test_a_command_of_nothing_changes_nothing(
                 still = TwistCommand(np.zeros(6))
                 arm.gateway.command(JogRequest(still, arm.arm.now + 1.0, client='somebody else'))
             arm.take(['work', 'work', 'cycle'])
-        paths.append(np.array(arm.arm.path))
+        paths.append(np.array(arm.drives.path))
     assert paths[1] == pytest.approx(paths[0], abs=1e-12)
 
 
@@ -381,22 +357,19 @@ def test_a_command_of_nothing_changes_nothing(
 @settings(max_examples=30, deadline=None)
 def test_a_core_that_raises_ends_every_command(kind: str, steps: list[str], later: int) -> None:
     """At every moment of every command: it ends once, with words, and nothing begins after it."""
-    arm = bench()
-    drives = arm.arm
-    assert isinstance(drives, Drives)
-    command, *_ = run_to_stop(arm, kind, steps, later)
+    arm = Bench()
+    command = arm.begin(kind, steps, later).command
     motion = None if command is None else command.motion
     is_over = motion is not None and motion.outcome is not None
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(arm.gateway._core, 'step', lambda *_: 1 // 0)
         with pytest.raises(ZeroDivisionError):
-            drives.run()
-    if command is not None and command.motion is None:
-        arm.take(['work'] * 3)
+            arm.drives.run()
     if command is not None:
+        if command.motion is None:
+            arm.take(['work'] * 3)
         assert is_over or 'ZeroDivisionError' in command.ended.result(0.0).reason
     assert arm.gateway.snapshot.source is Source.NONE
-    drives.attach()
+    arm.drives.attach()
     begin = arm.where
-    path = arm.settle()
-    assert np.abs(path[-1] - begin).max() == 0.0
+    assert np.abs(arm.settle()[-1] - begin).max() == 0.0

@@ -9,7 +9,16 @@ import contextlib
 import math
 
 import core_commands
-from core_commands import kept, stream, STREAM_PERIOD, twist_between, wave
+from core_commands import (
+    core_of,
+    ending,
+    goal_to,
+    kept,
+    stream,
+    STREAM_PERIOD,
+    twist_between,
+    wave,
+)
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from model_robots import chain, ready, robot, ROBOTS, two_arms
@@ -21,9 +30,7 @@ from arm_servo import Cause, MotionCore, NotReadyError, Phase, SetPoint, Source
 from arm_trajectory import (
     GoalCode,
     GoalError,
-    GoalPoint,
     OnlineTrajectoryGenerator,
-    TrajectoryGoal,
 )
 
 PERIOD = 0.01
@@ -35,16 +42,9 @@ def ask_back(core: MotionCore) -> None:
     core_commands.move_by(core, dict.fromkeys(core.model.joints, 0.0))
 
 
-def follow_back(core: MotionCore) -> None:
-    """Ask for a trajectory to the pose where it began."""
-    back = ready(core.model.name).tolist()
-    core_commands.follow(core, TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)]))
-
-
-def follow_later(core: MotionCore) -> None:
-    """Ask for the same, to begin when the arm rests."""
-    back = ready(core.model.name).tolist()
-    core_commands.follow(core, TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)], age=-1.5))
+def follow_back(core: MotionCore, age: float = 0.0) -> None:
+    """Ask for a trajectory to the pose where it began, from its stamp on."""
+    core_commands.follow(core, goal_to(core, ready(core.model.name), 6.0, age))
 
 
 ENDS: dict[str, Callable[[MotionCore], None]] = {
@@ -53,15 +53,13 @@ ENDS: dict[str, Callable[[MotionCore], None]] = {
     'time-out': lambda _core: None,
     'target': ask_back,
     'trajectory': follow_back,
-    'stamped trajectory': follow_later,
+    'stamped trajectory': lambda core: follow_back(core, -1.5),  # when the arm rests
 }
 
 
 def jog_into_contact(name: str, rng: np.random.Generator, cycles: int) -> MotionCore:
     """Return a core that jogs joints at random speeds for some cycles, or until links are near."""
-    model = robot(name)
-    core = MotionCore(model)
-    core.reset(ready(name))
+    core, model = core_of(name), robot(name)
     senses = rng.choice([-1.0, 1.0], len(model)) * rng.uniform(0.3, 1.0, len(model))
     speeds = dict(zip(model.joints, (senses * model.limits.velocity).tolist(), strict=True))
     for cycle in range(250):
@@ -95,8 +93,7 @@ def test_no_end_of_a_jog_leads_into_contact(name: str, end: str) -> None:
 
 def test_a_long_stop_stays_clear_all_along() -> None:
     """At full speed all joints go far until they rest; nothing in between is overlooked."""
-    core = MotionCore(robot('gp110'))
-    core.reset(ready('gp110'))
+    core = core_of('gp110')
     speeds = [-2.383, 0.79, -0.943, 1.404, 1.689, 1.695]
     jog = dict(zip(core.model.joints, speeds, strict=True))
     for cycle in range(250):
@@ -111,32 +108,18 @@ def test_a_long_stop_stays_clear_all_along() -> None:
 pytestmark = pytest.mark.slow
 
 
-def core_of(name: str) -> MotionCore:
-    """Return a core of a robot in its pose to start from."""
-    core = MotionCore(robot(name))
-    core.reset(ready(name))
-    return core
-
-
 @pytest.mark.parametrize('name', ROBOTS)
 def test_a_released_key_is_a_smooth_stop(name: str) -> None:
-    """Without a fresh command the arm comes to rest, and lets go of the jog."""
+    """A jog counts for its time-out; then the arm comes to rest, and lets go of the jog."""
     core = core_of(name)
     core_commands.twist(core, [0.1, 0, 0, 0, 0, 0], 0.0, duration=0.5)
     points = stream(core, 2.0)
-    assert any(point.state.moving for point in points)
+    speeds = [float(np.linalg.norm(point.state.velocity)) for point in points]
+    assert speeds[round(0.49 / STREAM_PERIOD)] > 0.9 * max(speeds)
+    assert speeds[round(0.6 / STREAM_PERIOD)] < 0.9 * max(speeds)
     assert not points[-1].state.moving
     assert core.source is Source.NONE
     kept(robot(name).limits, [point.state for point in points])
-
-
-def test_the_time_out_counts_from_the_command() -> None:
-    """A jog command counts for its time-out, and no longer."""
-    core = core_of('prbt')
-    core_commands.jog(core, {'prbt_joint_1': 0.5}, 0.0)
-    moving = [point.source for point in stream(core, 1.0)]
-    assert moving[0] is Source.JOG
-    assert moving[-1] is Source.NONE
 
 
 def test_a_stop_keeps_the_tool_on_its_line() -> None:
@@ -187,88 +170,57 @@ def test_without_an_answer_of_the_generator_the_arm_brakes(
     assert np.all(-fall <= robot('prbt').limits.acceleration * STREAM_PERIOD * 1.001)
 
 
-def test_a_reset_ends_what_moves_the_arm() -> None:
-    """After a reset the set-points begin at rest at the new place, and a trajectory has ended."""
+def test_what_takes_the_arm_ends_the_trajectory_with_words() -> None:
+    """A jog, with whom it lost the arm; a reset, after which the arm rests at the new place."""
     core = core_of('prbt')
-    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
-    stream(core, 0.4)
-    core.reset(ready('prbt') + 0.1, 'the drives were off')
-    assert execution.ending is not None
-    assert execution.ending.reason == 'the drives were off'
+    for reason in ('jogging took over', 'the drives were off'):
+        execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
+        stream(core, 0.4)
+        if 'jogging' in reason:
+            core_commands.jog(core, {'prbt_joint_1': 0.2}, 0.4)
+        else:
+            core.reset(ready('prbt') + 0.1, reason)
+        assert execution.phase is Phase.DONE
+        assert reason in ending(execution).reason
+        assert ending(execution).code is GoalCode.INVALID_GOAL
     assert stream(core, 0.1)[-1].state.position == pytest.approx(ready('prbt') + 0.1)
-
-
-def test_taking_over_ends_the_trajectory_with_words() -> None:
-    """A trajectory that loses the arm ends, and says to what."""
-    core = core_of('prbt')
-    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
-    stream(core, 0.4)
-    core_commands.jog(core, {'prbt_joint_1': 0.2}, 0.4)
-    assert execution.phase is Phase.DONE
-    assert execution.ending is not None
-    assert execution.ending.code is GoalCode.INVALID_GOAL
-    assert 'jogging took over' in execution.ending.reason
 
 
 @pytest.mark.parametrize('name', ROBOTS)
 def test_a_single_target_is_reached_at_rest(name: str) -> None:
     """A target is reached exactly, then the arm is free."""
-    core = core_of(name)
-    goal = {robot(name).joints[1]: float(ready(name)[1]) + 0.3}
-    core_commands.move_to(core, goal)
-    points = stream(core, 3.0)
-    expected = np.array(ready(name))
+    core, expected = core_of(name), np.array(ready(name))
     expected[1] += 0.3
+    core_commands.move_to(core, {robot(name).joints[1]: float(expected[1])})
+    points = stream(core, 3.0)
     assert points[-1].state.position == pytest.approx(expected, abs=1e-9)
     assert core.source is Source.NONE
     kept(robot(name).limits, [point.state for point in points])
 
 
-def test_nudges_add_up() -> None:
-    """Ten steps of a hundredth, one after the other or at once, make a tenth."""
+@pytest.mark.parametrize(
+    ('override', 'own', 'expected'),
+    [(0.2, math.inf, 0.314), (1.0, 0.25, 0.25), (0.5, 0.25, 0.125)],
+)
+def test_displacements_add_up_at_their_speed(override: float, own: float, expected: float) -> None:
+    """At once or one by one; as fast as was asked times the override, and no faster."""
     core = core_of('prbt')
+    core_commands.override(core, override)
     for _ in range(5):
-        core_commands.move_by(core, {'prbt_joint_1': 0.01})
-    stream(core, 1.0)
+        core_commands.move_by(core, {'prbt_joint_1': 0.05}, own)
+    points = stream(core, 0.5)
     for _ in range(5):
-        core_commands.move_by(core, {'prbt_joint_1': 0.01})
-        stream(core, 0.02)
-    core_commands.move_by(core, {'prbt_joint_2': 0.02})
-    end = stream(core, 1.0)[-1].state.position
-    assert end[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
-    with pytest.raises(CommandError, match='beyond its limits'):
-        core_commands.move_by(core, {'prbt_joint_1': 9.0})
-
-
-def test_a_target_goes_at_the_overridden_speed() -> None:
-    """At 20 % a joint moves at a fifth of its speed at most."""
-    core = core_of('prbt')
-    core_commands.override(core, 0.2)
-    core_commands.move_to(core, {'prbt_joint_1': 1.0})
-    points = stream(core, 2.0)
+        core_commands.move_by(core, {'prbt_joint_1': 0.05}, own)
+        points += stream(core, 0.02)
+    core_commands.move_by(core, {'prbt_joint_2': 0.02}, own)
+    points += stream(core, 6.0)
     fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
-    assert fastest == pytest.approx(0.2 * 1.57, rel=1e-3)
-
-
-def test_a_displacement_goes_at_its_own_speed() -> None:
-    """As fast as it was given and no faster, also with the speed override on top."""
-    for speed in (1.0, 0.5):
-        core = core_of('prbt')
-        core_commands.override(core, speed)
-        core_commands.move_by(core, {'prbt_joint_1': 0.5}, 0.25)
-        points = stream(core, 6.0)
-        fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
-        assert fastest == pytest.approx(0.25 * speed, rel=1e-3)
-        assert points[-1].state.position[0] - ready('prbt')[0] == pytest.approx(0.5, abs=1e-9)
-    with pytest.raises(CommandError, match='above 0'):
-        core_commands.move_by(core, {'prbt_joint_1': 0.5}, 0.0)
-    core_commands.override(core, 0.0)
-    with pytest.raises(CommandError, match='override is 0'):
-        core_commands.move_by(core, {'prbt_joint_1': 0.5})
+    assert fastest == pytest.approx(expected, rel=1e-3)
+    assert points[-1].state.position[:2] - ready('prbt')[:2] == pytest.approx([0.5, 0.02])
 
 
 def test_a_pause_holds_everything() -> None:
-    """Paused, a target waits and jogging is refused; then both go on."""
+    """Paused, a target waits and other commands are refused; then both go on."""
     core = core_of('prbt')
     core_commands.move_to(core, {'prbt_joint_1': 1.0})
     stream(core, 0.3)
@@ -280,6 +232,9 @@ def test_a_pause_holds_everything() -> None:
         core_commands.move_by(core, {'prbt_joint_1': 0.1})
     core_commands.resume(core)
     assert stream(core, 3.0)[-1].state.position[0] == pytest.approx(1.0)
+    core_commands.override(core, 0.0)
+    with pytest.raises(CommandError, match='override is 0'):
+        core_commands.move_by(core, {'prbt_joint_1': 0.5})
 
 
 def test_what_limits_is_in_the_set_point() -> None:
@@ -309,36 +264,28 @@ def test_nothing_is_commanded_before_the_position_is_known() -> None:
             command()
 
 
+JOINT, INF, NAN = 'prbt_joint_1', math.inf, math.nan
+TWIST = [0.1] * 6
+ONES = Pose(np.ones((3, 3)), np.zeros(3))
+send = core_commands
+
 BAD: dict[str, tuple[Callable[[MotionCore], object], str]] = {
-    'nan twist': (lambda c: core_commands.twist(c, [math.nan] * 6, 0.0), 'number 0 is nan'),
-    'short twist': (lambda c: core_commands.twist(c, [0.1] * 5, 0.0), '5 numbers, 6 are needed'),
-    'unknown link': (lambda c: core_commands.twist(c, [0.1] * 6, 0.0, link='hand'), "'hand'"),
-    'unknown joint': (lambda c: core_commands.jog(c, {'elbow': 0.1}, 0.0), "'elbow'"),
-    'infinite jog': (lambda c: core_commands.jog(c, {'prbt_joint_1': math.inf}, 0.0), 'inf'),
-    'no joint': (lambda c: core_commands.jog(c, {}, 0.0), 'no joint'),
-    'no rotation': (
-        lambda c: core_commands.track(c, Pose(np.ones((3, 3)), np.zeros(3)), 0.0),
-        'not a rotation',
-    ),
-    'reflected': (
-        lambda c: core_commands.twist(c, [0.1] * 6, 0.0, axes=-np.eye(3)),
-        'axes: not a rotation',
-    ),
-    'nan duration': (
-        lambda c: core_commands.twist(c, [0.1] * 6, 0.0, duration=math.nan),
-        'must be finite',
-    ),
-    'endless': (
-        lambda c: core_commands.jog(c, {'prbt_joint_1': 0.1}, 0.0, math.inf),
-        'must be finite',
-    ),
-    'target beyond': (
-        lambda c: core_commands.move_to(c, {'prbt_joint_3': 3.0}),
-        'beyond its limits',
-    ),
-    'target nan': (lambda c: core_commands.move_to(c, {'prbt_joint_3': math.nan}), 'nan'),
-    'speed': (lambda c: core_commands.override(c, 1.2), 'between 0 and 1'),
-    'speed nan': (lambda c: core_commands.override(c, math.nan), 'between 0 and 1'),
+    'nan twist': (lambda c: send.twist(c, [NAN] * 6, 0.0), 'number 0 is nan'),
+    'short twist': (lambda c: send.twist(c, [0.1] * 5, 0.0), '5 numbers, 6 are needed'),
+    'unknown link': (lambda c: send.twist(c, TWIST, 0.0, link='hand'), "'hand'"),
+    'unknown joint': (lambda c: send.jog(c, {'elbow': 0.1}, 0.0), "'elbow'"),
+    'infinite jog': (lambda c: send.jog(c, {JOINT: INF}, 0.0), 'inf'),
+    'no joint': (lambda c: send.jog(c, {}, 0.0), 'no joint'),
+    'no rotation': (lambda c: send.track(c, ONES, 0.0), 'not a rotation'),
+    'reflected': (lambda c: send.twist(c, TWIST, 0.0, axes=-np.eye(3)), 'axes: not a rotation'),
+    'nan duration': (lambda c: send.twist(c, TWIST, 0.0, duration=NAN), 'must be finite'),
+    'endless': (lambda c: send.jog(c, {JOINT: 0.1}, 0.0, INF), 'must be finite'),
+    'target beyond': (lambda c: send.move_to(c, {'prbt_joint_3': 3.0}), 'beyond its limits'),
+    'target nan': (lambda c: send.move_to(c, {'prbt_joint_3': NAN}), 'nan'),
+    'step beyond': (lambda c: send.move_by(c, {JOINT: 9.0}), 'beyond its limits'),
+    'no speed of a step': (lambda c: send.move_by(c, {JOINT: 0.5}, 0.0), 'above 0'),
+    'speed': (lambda c: send.override(c, 1.2), 'between 0 and 1'),
+    'speed nan': (lambda c: send.override(c, NAN), 'between 0 and 1'),
     'reset': (lambda c: c.reset([0.0] * 5), '5 numbers, 6 are needed'),
 }
 
@@ -367,9 +314,7 @@ def test_what_is_no_chain_is_refused() -> None:
 @pytest.mark.parametrize('period', [0.001, 0.002, 0.004])
 def test_a_jog_of_short_cycles_is_as_straight_as_one_of_long_cycles(period: float) -> None:
     """Joint speeds count for several cycles; held axes stay, a new command counts at once."""
-    model = robot('panda')
-    core = MotionCore(model)
-    core.reset(ready('panda'))
+    core, model = core_of('panda'), robot('panda')
     begin = model.pose(core.state.position)
     states = []
     for cycle in range(round(1.0 / period)):
@@ -381,9 +326,7 @@ def test_a_jog_of_short_cycles_is_as_straight_as_one_of_long_cycles(period: floa
     assert there.position[1] - begin.position[1] == pytest.approx(0.1, abs=0.02)
     assert there.position[[0, 2]] == pytest.approx(begin.position[[0, 2]], abs=3e-4)
     assert there.rotation == pytest.approx(begin.rotation, abs=1e-3)
-    speeds = np.array([state.velocity for state in states])
-    changes = np.abs(np.diff(speeds, axis=0)).max(axis=0) / period
+    changes = np.abs(np.diff([state.velocity for state in states], axis=0)).max(axis=0) / period
     assert (changes <= 1.01 * model.limits.acceleration).all()
     core_commands.twist(core, [0.0, -0.1, 0.0, 0.0, 0.0, 0.0], 1.0)
-    slower = core.step(1.0, period).state
-    assert np.abs(slower.acceleration).max() > 0.0
+    assert np.abs(core.step(1.0, period).state.acceleration).max() > 0.0
