@@ -87,12 +87,15 @@ STREAM_PERIOD = 0.004  # cycle of the streams in [s]
 
 
 def kept(limits: JointLimits, states: list[RobotState], period: float = STREAM_PERIOD) -> None:
-    """Make sure that set-points keep every limit, also where only positions are seen."""
+    """Make sure that set-points keep every limit, also where only positions are seen.
+
+    From beyond a limit of position the way leads back only.
+    """
     position = np.array([state.position for state in states])
     velocity = np.array([state.velocity for state in states])
     acceleration = np.array([state.acceleration for state in states])
-    assert np.all(position <= limits.upper + 1e-6)
-    assert np.all(position >= limits.lower - 1e-6)
+    assert np.all(position[1:] <= np.maximum(limits.upper, position[:-1]) + 1e-6)
+    assert np.all(position[1:] >= np.minimum(limits.lower, position[:-1]) - 1e-6)
     assert np.all(np.abs(velocity) <= limits.velocity * 1.0001)
     assert np.all(np.abs(acceleration) <= limits.acceleration * 1.0001)
     assert np.all(np.abs(np.diff(acceleration, axis=0)) <= limits.jerk * period * 1.0001)

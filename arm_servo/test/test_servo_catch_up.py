@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import core_commands
-from model_robots import ready, robot
+from core_commands import core_of, ending, goal_to
+from model_robots import ready
 import numpy as np
 import pytest
 
@@ -76,17 +77,15 @@ def test_catching_up_makes_no_contact(jog: float, aside: float, speed: float) ->
         assert core.model.clearance(state.position) > 0.0
         if not state.moving:
             break
-    assert execution.ending is not None
-    assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
-    assert 'base - tool' in execution.ending.reason
+    assert ending(execution).code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert 'base - tool' in ending(execution).reason
     assert core.source is Source.NONE
 
 
 def test_a_trajectory_is_void_where_the_arm_is_elsewhere() -> None:
     """Prepared from a place 0.02 rad away it is refused: its path was checked from there only."""
-    core = MotionCore(robot('panda'))
-    core.reset(ready('panda'))
-    goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, (ready('panda') + 0.2).tolist())])
+    core = core_of('panda')
+    goal = goal_to(core, ready('panda') + 0.2)
     basis = core.basis.foreseen(0.0)
     aside = replace(basis, state=RobotState.at_rest(basis.state.position + 0.02))
     motion = core.plan(goal, aside)

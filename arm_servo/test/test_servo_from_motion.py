@@ -9,7 +9,7 @@ from functools import cache
 import math
 
 import core_commands
-from core_commands import follow_to_the_end, kept, stream
+from core_commands import core_of, ending, follow_to_the_end, goal_to, kept, stream
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS
@@ -26,14 +26,7 @@ PERIOD = 0.01
 
 def core_at(name: str, positions: Array, check: bool = True) -> MotionCore:
     """Return a core whose arm rests somewhere."""
-    core = MotionCore(robot(name), CoreSettings(check_self_collision=check))
-    core.reset(positions)
-    return core
-
-
-def goal_to(core: MotionCore, positions: Array, duration: float = 8.0) -> TrajectoryGoal:
-    """Return a trajectory of one point."""
-    return TrajectoryGoal(core.model.joints, [GoalPoint(duration, positions.tolist())])
+    return core_of(name, CoreSettings(check_self_collision=check), positions)
 
 
 def by_name(core: MotionCore, positions: Array) -> dict[str, float]:
@@ -67,13 +60,11 @@ def test_a_trajectory_through_contact_is_refused_with_pair_and_time(name: str) -
     begin, end = find_blocked(name)
     core = core_at(name, begin)
     with pytest.raises(GoalError, match=r'would collide at \d+\.\d\d s') as caught:
-        core_commands.follow(core, goal_to(core, end))
+        core_commands.follow(core, goal_to(core, end, 8.0))
     assert caught.value.code is GoalCode.INVALID_GOAL
     assert core.source is Source.NONE
-    core.step(0.0, PERIOD)
-    assert core.state.position.tolist() == begin.tolist()
     allowed = core_at(name, begin, check=False)
-    path = core_commands.follow(allowed, goal_to(allowed, end)).path
+    path = core_commands.follow(allowed, goal_to(allowed, end, 8.0)).path
     time = float(str(caught.value).split(' would collide at ')[1].split(' s ')[0])
     times = np.arange(0.0, path.duration, 0.01)
     places = path.positions(times)
@@ -92,7 +83,7 @@ def test_a_single_target_through_contact_is_refused(name: str) -> None:
         core_commands.move_to(core, by_name(core, end))
     with pytest.raises(CommandError, match='would collide after'):
         core_commands.move_by(core, by_name(core, end - begin))
-    execution = core_commands.follow(core, goal_to(core, begin))
+    execution = core_commands.follow(core, goal_to(core, begin, 8.0))
     with pytest.raises(CommandError, match='would collide after'):
         core_commands.move_to(core, by_name(core, end))
     assert core.source is Source.TRAJECTORY
@@ -125,8 +116,12 @@ def test_an_arm_in_contact_may_part_and_not_go_deeper(name: str) -> None:
 
 def test_a_plan_is_void_when_another_command_came() -> None:
     """What was checked does not begin behind a stop, nor behind another motion."""
-    core = core_at('prbt', ready('prbt'))
-    for come_between in (core_commands.stop, core_commands.pause, _move_a_little):
+    core = core_of('prbt')
+
+    def another(core: MotionCore) -> None:
+        core_commands.move_by(core, {'prbt_joint_2': 0.01})
+
+    for come_between in (core_commands.stop, core_commands.pause, another):
         basis = core.basis
         motion = core.plan(DisplacementRequest({'prbt_joint_1': 0.1}), basis)
         assert motion is not None
@@ -138,10 +133,6 @@ def test_a_plan_is_void_when_another_command_came() -> None:
         assert core.source is Source.NONE
 
 
-def _move_a_little(core: MotionCore) -> None:
-    core_commands.move_by(core, {'prbt_joint_2': 0.01})
-
-
 pytestmark = pytest.mark.slow
 
 
@@ -149,8 +140,7 @@ def jogged(
     name: str, rng: np.random.Generator, by: str, duration: float
 ) -> tuple[MotionCore, list[RobotState]]:
     """Return a core whose arm was jogged for a time [s] at up to its limits, and its states."""
-    core = MotionCore(robot(name), CoreSettings(check_self_collision=False))
-    core.reset(ready(name))
+    core = core_at(name, ready(name), check=False)
     limits = core.model.limits
     if by == 'twist':
         twist = np.concatenate((rng.uniform(-0.6, 0.6, 3), rng.uniform(-1.0, 1.0, 3)))
@@ -163,21 +153,24 @@ def jogged(
     return core, [core.state, *(point.state for point in stream(core, duration))]
 
 
+KINDS = {'one point': 2.0, 'with time to spare': 8.0, 'there and back': 1.5, 'planned': 2.5}
+"""Trajectories as clients write them, with the time to a place near the arm in [s]."""
+
+
 def goal(core: MotionCore, rng: np.random.Generator, kind: str) -> TrajectoryGoal:
-    """Return a trajectory to a place near the arm, as clients write them."""
-    limits, here = core.model.limits, core.state.position
+    """Return a trajectory from where the arm is."""
+    limits, here, time = core.model.limits, core.state.position, KINDS[kind]
     there = np.clip(here + rng.uniform(-0.3, 0.3, len(limits)), limits.lower, limits.upper)
-    still = (0.0,) * len(limits)
-    points = {
-        'one point': [GoalPoint(2.0, tuple(there))],
-        'with time to spare': [GoalPoint(8.0, tuple(there))],
-        'there and back': [GoalPoint(1.5, tuple(there)), GoalPoint(3.0, tuple(here))],
-        'planned': [GoalPoint(0.0, tuple(here), still), GoalPoint(2.5, tuple(there), still)],
-    }[kind]
+    still = (0.0,) * len(limits) if kind == 'planned' else ()
+    points = [GoalPoint(time, tuple(there), still)]
+    if kind == 'planned':
+        points.insert(0, GoalPoint(0.0, tuple(here), still))
+    elif kind == 'there and back':
+        points.append(GoalPoint(2.0 * time, tuple(here)))
     return TrajectoryGoal(limits.names, points)
 
 
-@pytest.mark.parametrize('kind', ['one point', 'with time to spare', 'there and back', 'planned'])
+@pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('by', ['twist', 'joints'])
 @pytest.mark.parametrize('name', ROBOTS)
 @settings(max_examples=3, deadline=None)
@@ -191,8 +184,7 @@ def test_a_trajectory_right_after_a_jog_is_followed(
     wanted = goal(core, rng, kind)
     execution = core_commands.follow(core, wanted)
     states += follow_to_the_end(core, execution)[1:]
-    assert execution.ending is not None
-    assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending
+    assert ending(execution).code is GoalCode.SUCCESSFUL, ending(execution)
     assert states[-1].position == pytest.approx(wanted.points[-1].positions, abs=1e-6)
     kept(core.model.limits, states)
 
@@ -231,5 +223,5 @@ def test_a_jog_at_full_speed_hands_over_to_a_trajectory(where: str) -> None:
     assert reference.moving
     goal = TrajectoryGoal(limits.names, [GoalPoint(2.0, tuple(reference.position))])
     command = arm.gateway.request(goal)
-    arm.run(round(3.0 / 0.01))
+    arm.run(round(3.0 / PERIOD))
     assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL, command.ended.result(0.0)

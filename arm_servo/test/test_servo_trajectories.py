@@ -131,8 +131,10 @@ def test_a_new_goal_is_spliced_in(name: str, seed: int) -> None:
     goal = wave(robot(name), ready(name), rng.choice(['l', 'c', 'q']))
     second = core_commands.follow(core, goal)
     assert 'new trajectory' in ending(first).reason
-    states += follow_to_the_end(core, second)[1:]
+    after = follow_to_the_end(core, second)
     assert ending(second).code is GoalCode.SUCCESSFUL
+    assert off_the_path(after, second.path) < 1e-3
+    states += after[1:]
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(robot(name).limits, states)
 
