@@ -10,6 +10,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Any
 
+from core_commands import ending
 from model_robots import ready, robot
 import numpy as np
 
@@ -219,5 +220,10 @@ def move_by(gateway: CommandGateway, displacements: Mapping[str, float]) -> Moti
 def outcome(command: MotionCommand) -> Outcome:
     """Return how a trajectory has ended."""
     assert command.execution is not None, command.future.exception()
-    assert command.execution.ending is not None
-    return command.execution.ending
+    return ending(command.execution)
+
+
+def no_speed_jumps(path: Array, limits: Array) -> None:
+    """Make sure that no speed jumps, in rows of a path that belong to successive cycles."""
+    changes = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    assert (changes.max(axis=0) <= 1.02 * limits + 1e-6).all()

@@ -15,7 +15,16 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from servo_commands import Drives, Elsewhere, jog, move_by, PERIOD, SteppedWorker, twist
+from servo_commands import (
+    Drives,
+    Elsewhere,
+    jog,
+    move_by,
+    no_speed_jumps,
+    PERIOD,
+    SteppedWorker,
+    twist,
+)
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose
@@ -290,12 +299,6 @@ def test_a_stop_is_never_overtaken(
     assert isinstance(arm.arm, Drives) or arm.arm.cycle.at_rest
 
 
-def goes_on(path: Array, limits: Array) -> None:
-    """Make sure that no speed jumps."""
-    changes = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
-    assert (changes <= 1.02 * limits + 1e-6).all()
-
-
 @given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, st.sampled_from(sorted(COMMANDS)), STEPS)
 @example('long trajectory', ['cycle', 'work', 'cycle'], 0, 'jog', ['cycle'])
 @example('stamped trajectory', ['cycle'], 0, 'displacement', ['cycle'])
@@ -326,7 +329,7 @@ def test_the_newest_of_two_commands_counts(
     assert second is None or second.motion is not None, second.future.exception()
     if first is not None and older != newer:
         assert first.ended.done()
-    goes_on(np.array(arm.drives.path), arm.limits.acceleration)
+    no_speed_jumps(np.array(arm.drives.path), arm.limits.acceleration)
 
 
 @given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, st.booleans())
@@ -370,6 +373,8 @@ def test_a_core_that_raises_ends_every_command(kind: str, steps: list[str], late
             arm.take(['work'] * 3)
         assert is_over or 'ZeroDivisionError' in command.ended.result(0.0).reason
     assert arm.gateway.snapshot.source is Source.NONE
+    assert set(arm.drives.run()) == {None}  # until its drives are taken back
     arm.drives.attach()
     begin = arm.where
     assert np.abs(arm.settle()[-1] - begin).max() == 0.0
+    assert None not in arm.drives.run()

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+import contextlib
 from dataclasses import replace
 from itertools import pairwise
 import math
@@ -34,12 +35,28 @@ STEP = 0.004  # how far each trajectory of a stream goes in [rad]
 MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
 
 
-class Arm:
+class Client:
+    """What sends commands for the first joint of drives that others may take."""
+
+    def __init__(self, drives: Drives) -> None:
+        self.drives = drives
+
+    def wait(self, seconds: float) -> None:
+        """Send nothing."""
+        self.drives.run(round(seconds / PERIOD))
+
+    @property
+    def position(self) -> float:
+        """Where the first joint was sent in [rad]."""
+        return self.drives.axes[0].setpoint
+
+
+class Arm(Client):
     """A trajectory controller whose messages the test hands over, cycle by cycle."""
 
     def __init__(self, node: Any) -> None:
         rules = GoalRules(end_velocity=True)
-        self.drives = Drives(settings=CoreSettings(execution=ExecutionSettings(rules)))
+        super().__init__(Drives(settings=CoreSettings(execution=ExecutionSettings(rules))))
         joints = self.drives.gateway.model.joints
         parameters = declare_trajectory(node, joints)
         self.drives.gateway.get_ready = self._get_ready
@@ -52,10 +69,10 @@ class Arm:
         self.drives.attach()
         self.drives.run(2)
 
-    def send(self, target: float, duration: float = 0.02) -> None:
-        """Send the first joint to a place in [rad], and run a few cycles."""
-        self.publish(target, duration)
-        self.drives.run(2)
+    def _get_ready(self) -> bool:
+        is_detached = self.drives.source.get_ready()
+        self.taken_back += is_detached
+        return is_detached
 
     def publish(self, target: float, duration: float, speed: float | None = None) -> None:
         """Send the first joint to a place in [rad], with a speed in [rad/s] there."""
@@ -66,7 +83,12 @@ class Arm:
         point.time_from_start.nanosec = round(duration * 1e9)
         self._subscription.callback(JointTrajectory(joint_names=self._joints, points=[point]))
 
-    def stream(self, count: int) -> None:
+    def send(self, target: float, duration: float = 0.02) -> None:
+        """Send the first joint to a place in [rad], and run a few cycles."""
+        self.publish(target, duration)
+        self.drives.run(2)
+
+    def stream(self, count: int = 40) -> None:
         """Send trajectories as moveit_servo does: each goes on from where the arm is sent."""
         for _ in range(count):
             self.send(self.position + STEP)
@@ -76,19 +98,56 @@ class Arm:
         self._subscription.callback(JointTrajectory())
         self.drives.run(2)
 
-    def wait(self, seconds: float) -> None:
-        """Send nothing."""
-        self.drives.run(round(seconds / PERIOD))
 
-    @property
-    def position(self) -> float:
-        """Where the first joint was sent in [rad]."""
-        return self.drives.axes[0].setpoint
+class Stick(Client):
+    """A client that jogs."""
 
-    def _get_ready(self) -> bool:
-        is_detached = self.drives.source.get_ready()
-        self.taken_back += is_detached
-        return is_detached
+    def __init__(self, client: str = 'stick') -> None:
+        super().__init__(Drives().following())
+        self.drives.gateway.get_ready = self.drives.source.get_ready
+        self.client = client
+        self.refusals: list[str] = []
+
+    def push(self, speed: float, cycles: int = 1) -> None:
+        """Command a speed in each cycle, as the servo node does."""
+        for _ in range(cycles):
+            velocities = {'panda_joint1': speed}
+            command = JointCommand(*by_joint(self.drives.gateway.model, velocities, 'velocities'))
+            request = JogRequest(command, self.drives.now + 0.1, client=self.client)
+            future = self.drives.gateway.command(request)
+            self.drives.run()
+            if (error := future.exception(0.0)) is not None:
+                self.refusals.append(str(error))
+
+
+def halt(drives: Drives) -> None:
+    """Halt a drive from outside."""
+    drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
+
+
+def fault(drives: Drives) -> None:
+    """Fault a drive, and reset it from outside."""
+    axis = drives.axes[1]
+    drives.axes[1] = replace(axis, followable=False, refusal=Refusal(RefusalCause.FAULT))
+    drives.run(100)
+    drives.axes[1] = axis
+
+
+def select(drives: Drives) -> None:
+    """Select the mode in which the drives follow, as ``--enable`` does."""
+    for name in drives.source.axes:
+        selected = Refusal(RefusalCause.MODE_SELECTED, 'Cyclic synchronous position')
+        drives.source.released(name, selected)
+
+
+@contextlib.contextmanager
+def disabled(client: Client) -> Iterator[None]:
+    """Disable all drives, and enable them for something else."""
+    enabled, refusal = list(client.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    client.drives.axes = [replace(axis, followable=False, refusal=refusal) for axis in enabled]
+    client.wait(0.1)
+    yield
+    client.drives.axes = enabled
 
 
 @pytest.fixture
@@ -135,7 +194,7 @@ def test_a_tolerance_that_cannot_be_kept_is_refused_before_drives_are_got_back(
     *, arm: Arm, field: str, joint: str, position: float, code: GoalCode, words: str
 ) -> None:
     """With the name of the field."""
-    halts(arm)
+    halt(arm.drives)
     arm.drives.run(3)
     point = JointTrajectoryPoint(positions=[axis.setpoint for axis in arm.drives.axes])
     point.time_from_start.sec = 1
@@ -150,61 +209,45 @@ def test_a_tolerance_that_cannot_be_kept_is_refused_before_drives_are_got_back(
     assert arm.taken_back == 0
 
 
-def halts(arm: Arm) -> None:
-    """Somebody halts a drive."""
-    arm.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
-
-
-def drive_faults(arm: Arm) -> None:
-    """A drive drive_faults, and somebody resets it."""
-    axis = arm.drives.axes[1]
-    arm.drives.axes[1] = replace(axis, followable=False, refusal=Refusal(RefusalCause.FAULT))
-    arm.drives.run(100)
-    arm.drives.axes[1] = axis
-
-
 @pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
-@pytest.mark.parametrize('happens', [halts, drive_faults])
+@pytest.mark.parametrize('happens', [halt, fault])
 def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
-    arm: Arm, happens: Callable[[Arm], None], pause: float
+    arm: Arm, happens: Callable[[Drives], None], pause: float
 ) -> None:
     """Not after a pause either, as a stalled process makes it; let go and begun anew, it does."""
     begin = arm.position
-    arm.stream(40)
+    arm.stream()
     assert arm.position > begin + MOVED
-    happens(arm)
+    happens(arm.drives)
     arm.wait(0.5)
     rest = arm.position
     arm.wait(pause)
-    arm.stream(40)
+    arm.stream()
     arm.let_go()  # of no avail while it goes on
     arm.stream(10)
     assert arm.position == pytest.approx(rest, abs=1e-6)
     assert arm.taken_back == 0
     arm.wait(TOGETHER + 0.1)
     arm.let_go()
-    arm.stream(40)
+    arm.stream()
     assert arm.position > rest + MOVED
 
 
 def test_a_stream_moves_no_arm_that_is_enabled(arm: Arm) -> None:
     """It began while the drives were disabled; they were enabled for something else."""
-    enabled, disabled = list(arm.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
-    arm.drives.axes = [replace(axis, followable=False, refusal=disabled) for axis in enabled]
-    arm.wait(0.1)
-    arm.stream(5)
-    arm.drives.axes = enabled
+    with disabled(arm):
+        arm.stream(5)
     rest = arm.position
-    arm.stream(40)
+    arm.stream()
     assert arm.position == pytest.approx(rest, abs=1e-6)
 
 
 def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
     """Its first trajectory is a request; those that follow are not ended by it."""
-    halts(arm)
+    halt(arm.drives)
     arm.wait(0.5)
     rest = arm.position
-    arm.stream(40)
+    arm.stream()
     assert arm.position > rest + MOVED
     assert arm.taken_back == 1
 
@@ -235,7 +278,7 @@ def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:
     for target in (0.05, 0.1):
         arm.send(target, 1.0)
         arm.wait(TOGETHER + 0.1)
-    halts(arm)
+    halt(arm.drives)
     arm.wait(0.1)
     arm.send(0.2, 1.0)
     arm.wait(1.5)
@@ -245,12 +288,12 @@ def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:
 def test_who_activates_the_controller_lets_a_stream_in(arm: Arm) -> None:
     """A person has requested it, while none came."""
     arm.stream(10)
-    halts(arm)
+    halt(arm.drives)
     arm.wait(TOGETHER + 0.1)
     arm.controller.set_active(False)
     arm.controller.set_active(True)
     rest = arm.position
-    arm.stream(40)
+    arm.stream()
     assert arm.position > rest + MOVED
 
 
@@ -268,67 +311,16 @@ def test_an_empty_trajectory_stops(arm: Arm) -> None:
     assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.drives.path)) < 0.02
 
 
-class Stick:
-    """A client that jogs the first joint of an arm whose drives others may take."""
-
-    def __init__(self, client: str = 'stick') -> None:
-        self.drives = Drives().following()
-        self.drives.gateway.get_ready = self.drives.source.get_ready
-        self.client = client
-        self.refusals: list[str] = []
-
-    def push(self, speed: float, cycles: int = 1) -> None:
-        """Command a speed in each cycle, as the servo node does."""
-        for _ in range(cycles):
-            velocities = {'panda_joint1': speed}
-            command = JointCommand(*by_joint(self.drives.gateway.model, velocities, 'velocities'))
-            request = JogRequest(command, self.drives.now + 0.1, client=self.client)
-            future = self.drives.gateway.command(request)
-            self.drives.run()
-            if (error := future.exception(0.0)) is not None:
-                self.refusals.append(str(error))
-
-    def wait(self, seconds: float) -> None:
-        """Command nothing."""
-        self.drives.run(round(seconds / PERIOD))
-
-    @property
-    def position(self) -> float:
-        """Where the joint was sent in [rad]."""
-        return self.drives.axes[0].setpoint
-
-
-def halt(stick: Stick) -> None:
-    """Halt a drive from outside."""
-    stick.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
-
-
-def is_enabled(stick: Stick) -> None:
-    """Select the mode in which the drives follow, as ``--enable`` does."""
-    for name in stick.drives.source.axes:
-        selected = Refusal(RefusalCause.MODE_SELECTED, 'Cyclic synchronous position')
-        stick.drives.source.released(name, selected)
-
-
-def faults(stick: Stick) -> None:
-    """Fault a drive, and reset it from outside."""
-    axis = stick.drives.axes[1]
-    faulted = Refusal(RefusalCause.FAULT)
-    stick.drives.axes[1] = replace(axis, followable=False, refusal=faulted)
-    stick.drives.run(100)
-    stick.drives.axes[1] = axis
-
-
 @pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
-@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
+@pytest.mark.parametrize('happens', [halt, select, fault])
 def test_a_stick_that_is_held_moves_nothing_after_a_stop(
-    happens: Callable[[Stick], None], pause: float
+    happens: Callable[[Drives], None], pause: float
 ) -> None:
     """Its commands pause as a stalled process makes them; let go and pushed again, it moves."""
     stick = Stick()
     stick.push(0.2, 50)
     assert stick.drives.gateway.snapshot.source is Source.JOG
-    happens(stick)
+    happens(stick.drives)
     stick.wait(1.0)
     rest, attached = stick.position, len(stick.drives.attachments)
     stick.wait(pause)
@@ -346,11 +338,8 @@ def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
     """It was pushed while the drives were disabled; they were enabled for something else."""
     stick = Stick()
     stick.wait(1.0)
-    enabled, disabled = list(stick.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
-    stick.drives.axes = [replace(axis, followable=False, refusal=disabled) for axis in enabled]
-    stick.wait(0.1)
-    stick.push(0.2, 100)
-    stick.drives.axes = enabled
+    with disabled(stick):
+        stick.push(0.2, 100)
     rest = stick.position
     stick.push(0.2, 100)
     assert stick.position == pytest.approx(rest, abs=1e-6)
@@ -359,40 +348,30 @@ def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
     assert stick.position > rest + 0.02
 
 
-def test_a_new_push_gets_the_drives_back() -> None:
-    """The stick was let go before somebody took a drive."""
-    stick = Stick()
-    stick.push(0.2, 50)
-    stick.push(0.0)
-    stick.wait(1.0)
-    halt(stick)
-    stick.wait(0.1)
-    rest = stick.position
-    stick.push(0.2, 50)
-    assert stick.position > rest + 0.02
-
-
 def test_others_need_not_let_go() -> None:
     """Only who held when the arm stopped."""
     stick = Stick()
     stick.push(0.2, 50)
-    halt(stick)
+    halt(stick.drives)
     stick.wait(1.0)
     rest, stick.client = stick.position, 'another'
     stick.push(0.2, 50)
     assert stick.position > rest + 0.02
 
 
+@pytest.mark.parametrize('lets_go', ['by a zero', 'by silence'])
 @pytest.mark.parametrize('pause', [1.0, 3.0, 6.0])
-@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
-def test_who_was_silent_before_a_stop_moves_the_arm_after_it(
-    happens: Callable[[Stick], None], pause: float
+@pytest.mark.parametrize('happens', [halt, select, fault])
+def test_who_let_go_before_a_stop_moves_the_arm_after_it(
+    happens: Callable[[Drives], None], pause: float, lets_go: str
 ) -> None:
-    """A client that lets go by silence, as those of moveit_servo do, held nothing."""
+    """A new push gets the drives back. By silence clients of moveit_servo let go."""
     stick = Stick()
     stick.push(0.2, 50)
+    if lets_go == 'by a zero':
+        stick.push(0.0)
     stick.wait(5.0)
-    happens(stick)
+    happens(stick.drives)
     stick.wait(pause)
     rest = stick.position
     stick.push(0.2, 50)
