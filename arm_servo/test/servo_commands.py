@@ -8,10 +8,11 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from core_commands import ending
-from model_robots import ready, robot
+from model_robots import ready, robot, table, texts
 import numpy as np
 
 from arm_canopen import AxisFeedback, DriveState, MotionSource, Setpoint
@@ -227,3 +228,11 @@ def no_speed_jumps(path: Array, limits: Array) -> None:
     """Make sure that no speed jumps, in rows of a path that belong to successive cycles."""
     changes = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
     assert (changes.max(axis=0) <= 1.02 * limits + 1e-6).all()
+
+
+@cache
+def held_panda() -> tuple[str, str, dict[str, Any]]:
+    """Return the texts of a Panda in a world, as the Setup Assistant writes a virtual joint."""
+    urdf, srdf = texts('panda')
+    world = '<virtual_joint name="v" type="fixed" parent_frame="world" child_link="panda_link0"/>'
+    return urdf, srdf.replace('</robot>', f'{world}</robot>'), table('panda')

@@ -4,23 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from geometry_msgs.msg import TwistStamped
 from input_devices import InjectedDevices
 from isolation import Isolation
-from model_robots import FOLDER, ready, robot, STRAIGHT, texts, two_arms_texts
+from model_robots import FOLDER, STRAIGHT, texts, two_arms_texts
 from moveit_msgs.msg import ServoStatus
-import numpy as np
 import pytest
 import rclpy
 from rclpy.node import Node
-from servo_commands import Drives, InlineWorker, jog, move_by, PERIOD, twist
+from servo_commands import Drives, jog, move_by, twist
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import ArmError
@@ -28,132 +26,56 @@ from arm_servo import (
     Cause,
     CoreSettings,
     IkSettings,
-    JogRequest,
     Limiter,
-    MotionCore,
     MotionReport,
     PauseRequest,
     ServoSettings,
     Source,
-    TwistCommand,
     VelocityBoundsSettings,
 )
 from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.requests import CommandType
 from arm_servo.ros.canopen_backend import CanopenMotion
 from arm_servo.ros.group_motion import Offers
 from arm_servo.ros.motion_goals import Refusals, REPEAT_PERIOD, STATUS_PERIOD
-from arm_servo.ros.servo import code_of, Servo, status_of
+from arm_servo.ros.servo import code_of, status_of
 from arm_servo.teleop.servo_gamepad import ServoGamepad
 from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
 from node_runner import ParameterError
 from operator_input import OperatorInputError
 
 
-class Commands:
-    """A servo without its ROS node, and the arm behind it."""
+def test_a_refusal_is_one_line_of_the_log() -> None:
+    """Of a stream too, where only numbers differ; another reason is another line.
 
-    def __init__(self) -> None:
-        self.drives = Drives().following()
-        self.logged: list[str] = []
-        servo: Any = object.__new__(Servo)
-        logger = SimpleNamespace(error=lambda text, **_: self.logged.append(text))
-        servo._node = SimpleNamespace(get_logger=lambda: logger)
-        servo._paused, servo._kind = '', None
-        servo._gateway, servo._refusals = self.drives.gateway, Refusals()
-        self.servo = servo
-
-    def send(self, numbers: list[float], frame: str = '') -> None:
-        """Deliver a twist; the cycle of the test has its own time."""
-        expires = self.drives.now + 0.1
-
-        def convert(_message: object, _sent: float) -> JogRequest:
-            return JogRequest(TwistCommand(np.array(numbers)), expires)
-
-        message = TwistStamped()
-        message.header.frame_id = frame
-        self.servo._take(CommandType.TWIST, convert, message)
-
-
-def test_zeros_in_another_frame_do_not_touch_a_jog() -> None:
-    """A gamepad at rest streams them, while somebody jogs with the keyboard."""
-    commands = Commands()
-    for _ in range(80):
-        commands.send([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
-        commands.send([0.0] * 6, 'panda_hand')
-        commands.drives.run()
-    point = commands.drives.gateway.snapshot.set_point
-    assert point is not None
-    model, state = commands.drives.gateway.model, point.state
-    speed = (model.jacobian(state.position) @ state.velocity)[1]
-    assert abs(speed - 0.05) < 1e-3
-    commands.send([0.0] * 6)
-    commands.drives.run(40)
-    assert commands.drives.gateway.snapshot.source is Source.NONE
-
-
-def test_whatever_a_command_raises_ends_that_command_only() -> None:
-    """It is refused in the status, with a traceback in the log, and the next one counts."""
-    commands = Commands()
-
-    def fail(_message: object, _sent: float) -> JogRequest:
-        raise ZeroDivisionError('no such luck')
-
-    commands.servo._take(CommandType.TWIST, fail, TwistStamped())
-    assert 'ZeroDivisionError: no such luck' in commands.servo._refusals.fresh(0.0)
-    assert 'Traceback' in commands.logged[0]
-    gateway = commands.drives.gateway
-    gateway.get_ready = lambda: bool(1 // 0)
-    commands.send([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
-    assert len(commands.logged) == 2
-    gateway.get_ready = lambda: False
-    commands.send([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
-    commands.drives.run()
-    assert commands.drives.gateway.snapshot.source is Source.JOG
-
-
-def test_a_stream_with_old_stamps_is_one_line_of_the_log() -> None:
-    """What differs from message to message is a number; another reason is another line."""
-    refusals = Refusals()
-    lines = []
+    The status forgets it after a while, or with an accepted command. Later it is logged again.
+    """
+    refusals, lines = Refusals(), []
     for number in range(100):
         now = 0.03 * number
         refusals.note(f'stale: {0.1 + now:.2f} s old when it was read', now)
         assert refusals.fresh(now).startswith('stale')
         lines.append(refusals.to_log(now))
     assert [line for line in lines if line] == ['stale: 0.10 s old when it was read']
-    refusals.note('there is no joint elbow', 3.0)
-    assert refusals.to_log(3.0) == 'there is no joint elbow'
-
-
-def test_the_same_mistake_made_later_is_logged_again() -> None:
-    """A person who tries again after a while sees it again."""
-    refusals = Refusals()
-    refusals.note('paused', 1.0)
-    assert refusals.to_log(1.0) == 'paused'
-    later = 1.1 + REPEAT_PERIOD
-    refusals.note('paused', later)
-    assert refusals.to_log(later) == 'paused'
-
-
-def test_the_status_forgets_a_refusal() -> None:
-    """A while after it, or when a command is taken."""
-    refusals = Refusals()
-    refusals.note('paused', 1.0)
-    assert refusals.fresh(1.1 + STATUS_PERIOD) == ''
-    assert refusals.to_log(1.1 + STATUS_PERIOD) == ''
     refusals.note('paused', 3.0)
-    refusals.clear(3.0)
-    assert refusals.fresh(3.0) == ''
+    assert refusals.to_log(3.0) == 'paused'
+    later = 3.1 + STATUS_PERIOD
+    assert refusals.fresh(later) == refusals.to_log(later) == ''
+    again = 3.1 + REPEAT_PERIOD
+    refusals.note('paused', again)
+    assert refusals.to_log(again) == 'paused'
+    refusals.clear(again)
+    assert refusals.fresh(again) == ''
 
 
 SPACE = '/refused'  # nodes of tests of before may still be known in the domain
+URDF, SRDF, LIMITS = two_arms_texts()
 TWO_ARMS = {
-    'robot_description': two_arms_texts()[0],
-    'robot_description_semantic': two_arms_texts()[1],
+    'robot_description': URDF,
+    'robot_description_semantic': SRDF,
     'group': 'left',
     'other_groups': ['right'],
-    'limits': two_arms_texts()[2],
+    'limits': LIMITS,
+    'controller_name': 'right_controller',
 }
 
 
@@ -171,13 +93,13 @@ def gamepad() -> Node:
 def parameters(folder: Path, **values: object) -> list[str]:
     """Write parameters for all nodes of a process, with those of an arm."""
     urdf, srdf = texts('gp110')
-    arm = {'robot_description': urdf, 'robot_description_semantic': srdf}
-    file = folder / 'parameters.yaml'
     limits = FOLDER / 'gp110' / 'limits.yaml'
     if table := values.pop('limits', None):
         limits = folder / 'limits.yaml'
         limits.write_text(json.dumps({'joint_limits': table}))
+    arm = {'robot_description': urdf, 'robot_description_semantic': srdf}
     whole = arm | {'joint_limits': str(limits)} | values
+    file = folder / 'parameters.yaml'
     file.write_text(json.dumps({'/**': {'ros__parameters': whole}}))
     return ['--ros-args', '--params-file', str(file)]
 
@@ -193,11 +115,7 @@ def parameters(folder: Path, **values: object) -> list[str]:
         (motion, {'group': 'arm'}, "'arm'"),
         (motion, {'joints': ['a', 'b']}, 'not those of the group'),
         (motion, {}, 'bus.yml has no drive'),
-        (
-            motion,
-            TWO_ARMS | {'controller_name': 'right_controller'},
-            'another group of this robot',
-        ),
+        (motion, TWO_ARMS, 'another group of this robot'),
         (ServoKeyboardInput, {'sped': 0.1}, "did you mean 'speed'"),
         (ServoKeyboardInput, {'speed': 1.5}, 'speed is 1.5: it must be 0.01 to 1.0'),
         (ServoKeyboardInput, {'rate': 1}, 'rate is 1: it must be 10.0 to 500.0'),
@@ -227,92 +145,60 @@ def test_a_refused_node_leaves_nothing_in_the_graph(
         rclpy.shutdown()
 
 
-def attached(name: str = 'panda', at: Sequence[float] = ()) -> Drives:
-    """Return drives that follow, in a pose."""
-    drives = Drives(name)
-    if at:
-        drives.place(at)
-    drives.attach()
-    drives.run(2)
-    return drives
+Send = Callable[[CommandGateway, float], object]
+LATE = ServoSettings(ik=IkSettings(brakes=VelocityBoundsSettings(pairs=0)))
+"""With these a jog brakes in front of no link, so that the safety filter stops it."""
 
 
-def codes(drives: Drives, cycles: int) -> list[tuple[int, str]]:
-    """Run cycles, and return the status of each that is another than the one before."""
-    found: list[tuple[int, str]] = []
-    for _ in range(cycles):
+def sideways(gateway: CommandGateway, now: float) -> object:
+    """Jog the tool along y."""
+    return twist(gateway, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], now, 60.0)
+
+
+def inwards(gateway: CommandGateway, now: float) -> object:
+    """Jog the hand of a Panda into its forearm."""
+    return jog(gateway, {'panda_joint6': -1.0}, now, 60.0)
+
+
+def outwards(gateway: CommandGateway, now: float) -> object:
+    """Jog the first joint of a Panda to its end."""
+    return jog(gateway, {'panda_joint1': 2.0}, now, 60.0)
+
+
+SLOWED, HALTED = ServoStatus.DECELERATE_FOR_COLLISION, ServoStatus.HALT_FOR_COLLISION
+
+
+@pytest.mark.parametrize(
+    ('name', 'servo', 'send', 'codes', 'words'),
+    [
+        ('panda', ServoSettings(), sideways, [ServoStatus.NO_WARNING], ['free']),
+        ('panda', ServoSettings(), outwards, [ServoStatus.JOINT_BOUND], ['panda_joint1']),
+        ('panda', ServoSettings(), inwards, [SLOWED, HALTED], ['panda_link5', 'panda_hand']),
+        ('panda', LATE, inwards, [HALTED], ['panda_link5', 'panda_hand']),
+        ('gp110', ServoSettings(), sideways, [ServoStatus.HALT_FOR_SINGULARITY], ['y is lost']),
+    ],
+)
+def test_what_limits_a_jog_is_reported(
+    name: str, servo: ServoSettings, send: Send, codes: list[int], words: list[str]
+) -> None:
+    """As soon as it slows down, with the joint, the links or the direction."""
+    begin = STRAIGHT['gp110'].tolist() if name == 'gp110' else None
+    drives = Drives(name, begin=begin, settings=CoreSettings(servo=servo)).following()
+    send(drives.gateway, drives.now)
+    found: dict[int, str] = {}
+    for _ in range(60 if send is sideways else 300):
         drives.run()
-        status = status_of(drives.gateway.snapshot, '', '', '')
-        if not found or found[-1][0] != status[0]:
-            found.append(status)
-    return found
-
-
-def test_a_free_jog_has_no_warning() -> None:
-    """And the message says that nothing limits it."""
-    drives = attached()
-    twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
-    assert codes(drives, 60)[-1] == (ServoStatus.NO_WARNING, 'free')
-
-
-def test_a_jog_to_a_joint_limit_is_reported() -> None:
-    """With the joint, as soon as it is slowed down."""
-    drives = attached()
-    jog(drives.gateway, {'panda_joint1': 2.0}, drives.now, 60.0)
-    code, words = codes(drives, 300)[-1]
-    assert code == ServoStatus.JOINT_BOUND
-    assert 'panda_joint1' in words
-
-
-def test_a_jog_into_contact_is_slowed_down_and_then_halted() -> None:
-    """With the two links."""
-    drives = attached()
-    jog(drives.gateway, {'panda_joint6': -1.0}, drives.now, 60.0)
-    found = codes(drives, 300)
-    assert ServoStatus.DECELERATE_FOR_COLLISION in [code for code, _ in found]
-    code, words = found[-1]
-    assert code == ServoStatus.HALT_FOR_COLLISION
-    assert 'panda_link5' in words
-    assert 'panda_hand' in words
-
-
-def test_a_direction_that_is_lost_is_reported() -> None:
-    """The straight arm cannot go sideways without its elbow."""
-    drives = attached('gp110', STRAIGHT['gp110'].tolist())
-    twist(drives.gateway, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
-    code, words = codes(drives, 60)[-1]
-    assert code == ServoStatus.HALT_FOR_SINGULARITY
-    assert 'y is lost' in words
-
-
-def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
-    """Where nothing else brakes in front of contact, it does, with code and links."""
-    core = MotionCore(
-        robot('panda'),
-        CoreSettings(servo=ServoSettings(ik=IkSettings(brakes=VelocityBoundsSettings(pairs=0)))),
-    )
-    gateway = CommandGateway(core, InlineWorker(), lambda: 100.0)
-    core.reset(ready('panda'))
-    gateway.update(100.0, PERIOD, core.state, core.state.position, '')
-    jog(gateway, {'panda_joint6': -1.0}, 100.0, 60.0)
-    reported = set()
-    for cycle in range(250):
-        state = core.state
-        gateway.update(100.0 + cycle * PERIOD, PERIOD, state, state.position, '')
-        code, words = status_of(gateway.snapshot, '', '', '')
-        reported.add(code)
-        if code == ServoStatus.HALT_FOR_COLLISION:
-            assert 'panda_link5' in words
-            assert 'panda_hand' in words
-    assert ServoStatus.HALT_FOR_COLLISION in reported
-    assert core.model.clearance(core.state.position) > 0.004
+        code, text = status_of(drives.gateway.snapshot, '', '', '')
+        found[code] = text
+    assert set(codes) <= set(found)
+    assert code == codes[-1]
+    assert all(word in found[codes[-1]] for word in words)
+    assert drives.gateway.model.clearance(drives.path[-1]) > 0.004
 
 
 def test_what_stops_a_trajectory_is_reported_too() -> None:
     """The safety filter holds whatever moves the arm; its code is not only the jog's."""
-    drives = attached()
-    move_by(drives.gateway, {'panda_joint1': 0.3})
-    drives.run(5)
+    drives = Drives().following()
     snapshot = drives.gateway.snapshot
     assert snapshot.set_point is not None
     report = MotionReport(0.0, (Limiter(Cause.COLLISION, 'hand - arm', 0.01, 0.0),))
@@ -332,56 +218,32 @@ def test_the_strongest_limit_is_the_one_that_counts() -> None:
         assert report.limiters[0] is halted
         assert code_of(report) == ServoStatus.JOINT_BOUND
     assert MotionReport(0.6, (slowed,)).with_limiter(halted).limiters[0] is halted
+    # what rounding leaves beyond the limit is no negative zero
+    beyond = replace(halted, amount=-1e-9)
+    assert str(beyond) == 'joint limit: elbow, 0.000 left, halted'
 
 
-def test_a_refusal_comes_before_everything_else() -> None:
-    """A person whose command was refused sees why, whatever else goes on."""
-    drives = attached()
-    assert status_of(drives.gateway.snapshot, 'stale', 'paused', 'cut') == (-1, 'stale')
+def test_it_reports_what_moves_the_arm_and_why_it_does_not() -> None:
+    """A refusal first of all, with the remedy; a cycle that stands still is no news."""
+    drives = Drives().following()
 
+    def status(*words: str, age: float = 0.0, cycles: int = 3) -> tuple[int, str]:
+        drives.run(cycles)
+        return status_of(drives.gateway.snapshot, *(words or ('', '', '')), age)
 
-def test_a_cycle_that_stands_still_is_reported() -> None:
-    """What the last cycle said is not repeated for ever."""
-    drives = attached()
-    code, words = status_of(drives.gateway.snapshot, '', '', '', 3.0)
+    assert status() == (ServoStatus.NO_WARNING, 'ready')
+    assert status('stale', 'paused', 'cut') == (ServoStatus.INVALID, 'stale')
+    assert status('', 'paused', 'cut') == (ServoStatus.NO_WARNING, 'paused')
+    move_by(drives.gateway, {'panda_joint1': 0.3})
+    assert 'target' in status()[1]
+    twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
+    assert status('', '', 'cut to 1')[1].startswith('cut to 1')
+    code, words = status(age=3.0)
     assert code == ServoStatus.INVALID
     assert '3.0 s ago' in words
-
-
-def test_a_blocked_arm_says_so() -> None:
-    """Without drives the status is invalid, and names the remedy."""
-    drives = attached()
+    drives.gateway.command(PauseRequest())
+    assert '~/resume' in status()[1]
     drives.source.released('panda_joint1', Refusal(RefusalCause.SINGLE_TARGET))
-    drives.run(3)
-    code, words = status_of(drives.gateway.snapshot, '', '', '')
+    code, words = status()
     assert code == ServoStatus.INVALID
     assert 'panda_joint1' in words
-
-
-def test_it_reports_what_moves_the_arm() -> None:
-    """Also while nobody jogs."""
-    drives = attached()
-    assert status_of(drives.gateway.snapshot, '', '', '') == (ServoStatus.NO_WARNING, 'ready')
-    move_by(drives.gateway, {'panda_joint1': 0.3})
-    drives.run(5)
-    assert 'target' in status_of(drives.gateway.snapshot, '', '', '')[1]
-    twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
-    drives.run(2)
-    assert status_of(drives.gateway.snapshot, '', '', 'cut to 1')[1].startswith('cut to 1')
-
-
-@pytest.mark.parametrize('paused', [False, True])
-def test_a_pause_of_the_arm_is_reported(paused: bool) -> None:
-    """Jogging is refused then, and the message names the service that ends it."""
-    drives = attached()
-    if paused:
-        drives.gateway.command(PauseRequest())
-    drives.run(2)
-    words = status_of(drives.gateway.snapshot, '', '', '')[1]
-    assert ('~/resume' in words) == paused
-
-
-def test_a_joint_at_its_limit_has_nothing_left() -> None:
-    """What rounding leaves beyond the limit is no negative zero."""
-    at_limit = Limiter(Cause.JOINT_POSITION, 'elbow', -1e-9, 0.0)
-    assert str(at_limit) == 'joint limit: elbow, 0.000 left, halted'
