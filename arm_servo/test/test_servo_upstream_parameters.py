@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameter files of MoveIt and ros2_control load as they are: every name, and its default."""
+"""Parameter files of MoveIt and ros2_control load as they are; what is wrong is reported."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import core_commands
+from core_commands import core_of
 from isolation import Isolation
 from model_robots import FOLDER, ready, robot, texts
 import pytest
@@ -124,6 +125,14 @@ def servo_parameters(**values: object) -> ServoParameters:
     return declare_servo(cast('Node', sheet), robot('panda'))
 
 
+def jogged(core: MotionCore, joint: str, speed: float) -> float:
+    """Jog a joint for 4 s; return where the first joint is then in [rad]."""
+    for cycle in range(400):
+        core_commands.jog(core, {joint: speed}, 0.01 * cycle)
+        core.step(0.01 * cycle, 0.01)
+    return float(core.state.position[0])
+
+
 @pytest.mark.parametrize(
     ('values', 'margin'),
     [
@@ -137,31 +146,21 @@ def test_jogs_come_to_rest_at_the_margins_of_the_joint_limits(
     values: dict[str, object], margin: float
 ) -> None:
     """Where moveit_servo of Jazzy and of Humble does; an arm beyond one may go back."""
+    upper, others = robot('panda').limits.upper[0], ready('panda')[1:].tolist()
     settings = CoreSettings(servo=servo_parameters(**values).settings)
-    core, upper = MotionCore(robot('panda'), settings), robot('panda').limits.upper[0]
-    core.reset([upper - 0.5, *ready('panda')[1:].tolist()])
-    for cycle in range(300):
-        core_commands.jog(core, {'panda_joint1': 1.0}, 0.01 * cycle)
-        core.step(0.01 * cycle, 0.01)
-    assert upper - core.state.position[0] == pytest.approx(margin, abs=2e-3)
-    core.reset([upper - 0.05, *ready('panda')[1:].tolist()])
-    for cycle in range(100):
-        core_commands.jog(core, {'panda_joint1': -1.0}, 0.01 * cycle)
-        core.step(0.01 * cycle, 0.01)
-    assert core.state.position[0] < upper - 0.5
+    core = core_of('panda', settings, [upper - 0.5, *others])
+    assert upper - jogged(core, 'panda_joint1', 1.0) == pytest.approx(margin, abs=2e-3)
+    core.reset([upper - 0.05, *others])
+    assert jogged(core, 'panda_joint1', -0.5) < upper - 0.5
 
 
 @pytest.mark.parametrize('threshold', [0.01, 0.03])
 def test_jogs_come_to_rest_at_the_proximity_threshold(threshold: float) -> None:
     """In front of the other links of the arm."""
     parameters = servo_parameters(self_collision_proximity_threshold=threshold)
-    core = MotionCore(
-        robot('panda'), CoreSettings(servo=parameters.settings, clearance=parameters.clearance)
-    )
-    core.reset(ready('panda'))
-    for cycle in range(400):
-        core_commands.jog(core, {'panda_joint6': -1.0}, 0.01 * cycle)
-        core.step(0.01 * cycle, 0.01)
+    settings = CoreSettings(servo=parameters.settings, clearance=parameters.clearance)
+    core = core_of('panda', settings)
+    jogged(core, 'panda_joint6', -1.0)
     assert core.model.clearance(core.state.position) == pytest.approx(threshold, abs=2e-3)
 
 
@@ -170,3 +169,42 @@ def test_margins_that_do_not_fit_the_joints_are_refused(margins: list[float]) ->
     """With the joint, or the count."""
     with pytest.raises(ModelError, match='joint_limit_margins'):
         servo_parameters(joint_limit_margins=margins)
+
+
+CONTROL_GP110 = 'gp110_arm_controller'
+
+
+def refused(node: str, **parameters: object) -> list[tuple[str, str]]:
+    """Check a file that has parameters of one node."""
+    nodes: dict[str, Any] = {'controller_manager': {'controller_name': CONTROL_GP110}}
+    return check_parameters(GroupModels([robot('gp110')]), document(**nodes | {node: parameters}))
+
+
+@pytest.mark.parametrize(
+    ('node', 'parameters', 'words'),
+    [
+        (CONTROL_GP110, {'constraints': {'goal_tim': 1.0}}, "mean 'constraints.goal_time'"),
+        (CONTROL_GP110, {'constraints': {'joint_1_s': {'goal': 'near'}}}, "'near'"),
+        (CONTROL_GP110, {'joints': ['elbow']}, 'not those of the group'),
+        (CONTROL_GP110, {'following_error_limit': -1.0}, 'following_error_limit'),
+        ('servo_node', {'moveit_servo': {'move_group_name': 'hand'}}, "'hand'"),
+        ('servo_node', {'moveit_servo.scale.linaer': 0.1}, "mean 'moveit_servo.scale.linear'"),
+        ('servo_node', {'tip_link': 'elsewhere'}, "'elsewhere'"),
+        ('/joint_state_broadcaster', {'update_rate': 'often'}, "'often'"),
+    ],
+)
+def test_each_mistake_is_reported_in_the_words_of_the_node(
+    node: str, parameters: dict[str, object], words: str
+) -> None:
+    """Without the nodes; the one is named, and no other one complains."""
+    ((name, reason),) = refused(node, **parameters)
+    assert name == node.lstrip('/')
+    assert words in reason
+
+
+def test_what_is_right_and_what_is_for_others_passes() -> None:
+    """Whole numbers for numbers, parameters of other controllers; for every node, as in rcl."""
+    assert refused(CONTROL_GP110, constraints={'goal_time': 1}, open_loop_control=True) == []
+    assert refused('rviz', constraints={'goal_tim': 1}) == []
+    assert refused('/**', use_sim_time=False) == []
+    assert refused('/**', following_delay=9.0)[0][0] == CONTROL_GP110
