@@ -311,6 +311,12 @@ class CommandGateway:
         self._prepare_next()
         return command
 
+    @property
+    def is_preparing(self) -> bool:
+        """Whether a requested motion has neither started nor been refused yet."""
+        with self._lock:
+            return self._preparing is not None or bool(self._waiting)
+
     def cancel(self, command: MotionCommand, reason: str) -> None:
         """Cancel a motion: if it has not started, drop it; else bring the arm to rest."""
 

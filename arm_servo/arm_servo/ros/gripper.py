@@ -190,9 +190,11 @@ class GripperController:
         return self._gateway.request(request, goal.number)
 
     def _watch(self) -> None:
+        is_preparing = self._gateway.is_preparing  # first: what begins meanwhile is seen below
         for interface, goals in self._servers:
             goals.watch(partial(self._watch_goal, interface, goals))
-        self._hold()
+        if not is_preparing:  # a newer goal takes the gripper from where it is
+            self._hold()
 
     def _watch_goal(
         self, interface: GripperInterface, goals: MotionGoals[_Goal], goal: _Goal
