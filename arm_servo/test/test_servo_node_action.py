@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,180 +17,158 @@ from std_srvs.srv import Trigger
 
 from arm_servo import Source, SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
-from arm_servo.core.gateway import MotionCommand
 from arm_servo.ros import motion_goals
 from arm_servo.ros import trajectory as controller
 from arm_servo.ros.trajectory import TrajectoryAction, TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
-def action(monkeypatch: pytest.MonkeyPatch, drives: Drives, follow: Any) -> GoalNode:
-    """Return the node of an action whose goals have trajectories for requests."""
-    node: Any = GoalNode(monkeypatch)
-    TrajectoryAction(
-        node,
-        drives.gateway,
-        20.0,
-        lambda request, number: follow(request.goal, number=number),
-        0.01,
-    )
-    return cast('GoalNode', node)
+class Bench:
+    """Simulated drives, and the node of an action whose goals have trajectories for requests."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.worker = SteppedWorker()
+        self.drives = Drives(worker=self.worker).following()
+        clock = SimpleNamespace(monotonic=lambda: self.drives.now)
+        monkeypatch.setattr(motion_goals, 'time', clock)
+        node: Any = GoalNode(monkeypatch)
+        self.node: GoalNode = node
+        self.request = self.drives.gateway.request
+        TrajectoryAction(
+            node,
+            self.drives.gateway,
+            20.0,
+            lambda request, number: self.request(request.goal, number=number),
+            0.01,
+        )
+
+    def send(
+        self, far: float = 0.5, time: float = 5.0, meanwhile: Callable[[], object] = lambda: None
+    ) -> Any:
+        """Send a goal that moves all joints; something happens before it is accepted."""
+        there = [axis.setpoint + far for axis in self.drives.axes]
+        goal = TrajectoryGoal(self.drives.gateway.model.joints, [GoalPoint(time, there)])
+        message = SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
+        return self.node.send(message, meanwhile)
+
+    def run(self, cycles: int) -> None:
+        """Run cycles, and prepare what was requested."""
+        for _ in range(cycles):
+            self.worker.run()
+            self.drives.run()
+
+    def on_its_way(self) -> Any:
+        """Send a goal, and let it be followed for 100 cycles."""
+        goal = self.send()
+        self.run(100)
+        return goal
 
 
-def message(goal: object) -> Any:
-    """Return a goal message."""
-    return SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """An action."""
+    return Bench(monkeypatch)
 
 
-def on_its_way(monkeypatch: pytest.MonkeyPatch) -> tuple[Drives, GoalNode, Any]:
-    """Send a goal in the time of simulated drives, and let them follow it for 100 cycles."""
-    drives = Drives().following()
-    clock = SimpleNamespace(monotonic=lambda: drives.now)
-    monkeypatch.setattr(motion_goals, 'time', clock)
-    node = action(monkeypatch, drives, drives.gateway.request)
-    there = [axis.setpoint + 0.5 for axis in drives.axes]
-    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
-    drives.run(100)
-    return drives, node, goal
+def stumble(*_: object) -> Any:
+    """Raise what is not foreseen."""
+    raise ZeroDivisionError('no such luck')
 
 
-def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """It does not leave the callback, where it would end the master and all drives with it."""
-
-    def follow(_goal: TrajectoryGoal, number: int) -> MotionCommand:
-        raise ZeroDivisionError(f'no such luck with {number}')
-
-    node = action(monkeypatch, Drives().following(), follow)
-    goal = node.send(message(None))
-    assert goal.ending == 'aborted'
-    assert goal.result.error_code == GoalCode.INVALID_GOAL
-    assert 'ZeroDivisionError' in goal.result.error_string
-    assert node.logged
-
-
-@pytest.mark.parametrize('when', ['at the end', 'while it is watched'])
+@pytest.mark.parametrize('when', ['at the start', 'planned', 'watched', 'at the end'])
 def test_an_unexpected_error_is_the_result_of_a_goal(
-    monkeypatch: pytest.MonkeyPatch, when: str
+    monkeypatch: pytest.MonkeyPatch, bench: Bench, when: str
 ) -> None:
-    """Rclpy would answer with code 0, which is SUCCESSFUL, or never; the arm comes to rest."""
-    drives = Drives().following()
-    node = action(monkeypatch, drives, drives.gateway.request)
-    there = [axis.setpoint + 0.5 for axis in drives.axes]
-    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
-    if when == 'at the end':
-        drives.run(600)
-        monkeypatch.setattr(Outcome, 'code', property(lambda _: 1 // 0))
-    else:
-        drives.run(100)
-        monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
-        node.watch()
-        drives.run()
-        node.watch()
-        assert goal.ending == ''  # the arm still brakes
-        drives.run(300)
-    node.watch()
+    """Rclpy would answer with code 0, which is SUCCESSFUL, or never; the arm comes to rest.
+
+    It does not leave a callback, where it would end the master and all drives with it. The next
+    goal is as ever.
+    """
+    begin = bench.drives.path[-1][0]
+    with monkeypatch.context() as patch:
+        if when == 'at the start':
+            patch.setattr(bench, 'request', lambda *_, **__: stumble())
+        elif when == 'planned':
+            patch.setattr(bench.drives.gateway._core, 'plan', stumble)
+        goal = bench.on_its_way()
+        if when == 'watched':
+            goal.publish_feedback = stumble
+            bench.node.watch()
+            bench.run(1)
+            bench.node.watch()
+            assert goal.ending == ''  # the arm still brakes
+            bench.run(300)
+        elif when == 'at the end':
+            bench.run(500)
+            patch.setattr(Outcome, 'code', property(stumble))
+        bench.node.watch()
     assert goal.ending == 'aborted'
     assert goal.result.error_code == GoalCode.INVALID_GOAL
-    assert 'ZeroDivisionError' in goal.result.error_string
-    drives.run(300)
-    assert drives.gateway.snapshot.source is Source.NONE
-    assert (drives.path[-1][0] < there[0] - 0.1) == (when == 'while it is watched')
+    assert 'ZeroDivisionError: no such luck' in goal.result.error_string
+    assert bench.node.logged
+    bench.run(300)
+    assert bench.drives.gateway.snapshot.source is Source.NONE
+    moved = {'watched': 0.4, 'at the end': 0.5}.get(when, 0.0)
+    assert begin <= bench.drives.path[-1][0] <= begin + moved + 1e-6
+    good = bench.send(0.05, 2.0)
+    bench.run(300)
+    bench.node.watch()
+    assert (good.ending, good.result.error_code) == ('succeeded', GoalCode.SUCCESSFUL)
 
 
-def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(bench: Bench) -> None:
     """It failed while it was watched, and no cycle comes in which the arm is at rest."""
-    drives, node, goal = on_its_way(monkeypatch)
-    monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
-    node.watch()
+    goal = bench.on_its_way()
+    goal.publish_feedback = stumble
+    bench.node.watch()
     assert goal.ending == ''
-    drives.now += 11.0
-    node.watch()
+    bench.drives.now += 11.0
+    bench.node.watch()
     assert goal.ending == 'aborted'
     assert 'not seen at rest for 10 s and may still move' in goal.result.error_string
 
 
 @pytest.mark.parametrize('rests', [True, False])
-def test_a_canceled_goal_is_answered_when_rest_was_seen(
-    monkeypatch: pytest.MonkeyPatch, rests: bool
-) -> None:
+def test_a_canceled_goal_is_answered_when_rest_was_seen(bench: Bench, rests: bool) -> None:
     """Drives come to rest later than their set-points; where they do not, the answer says so."""
-    drives, node, goal = on_its_way(monkeypatch)
-    node.cancel(goal)
+    goal, drives = bench.on_its_way(), bench.drives
+    bench.node.cancel(goal)
     drives.run(300)
     drives.axes = [replace(axis, velocity=0.1) for axis in drives.axes]
     drives.run()
-    node.watch()
+    bench.node.watch()
     assert goal.ending == ''
     if rests:
         drives.run()
     else:
         drives.now += 11.0
-    node.watch()
+    bench.node.watch()
     assert goal.ending == 'canceled'
     assert ('not seen at rest for 10 s' in goal.result.error_string) is not rests
 
 
-def test_an_unexpected_error_of_the_planning_is_its_result(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The next goal is planned as ever."""
-    drives = Drives().following()
-    node = action(monkeypatch, drives, drives.gateway.request)
-    there = [axis.setpoint + 0.05 for axis in drives.axes]
-    goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])
-    with monkeypatch.context() as patch:
-        patch.setattr(drives.gateway._core, 'plan', lambda *_: 1 // 0)
-        bad = node.send(message(goal))
-        drives.run(5)
-        node.watch()
-        assert bad.result.error_code == GoalCode.INVALID_GOAL
-    good = node.send(message(goal))
-    drives.run(300)
-    node.watch()
-    assert good.ending == 'succeeded'
-    assert good.result.error_code == GoalCode.SUCCESSFUL
-
-
-def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The acceptance is delayed for the client; the next goal moves the arm again."""
-    drives = Drives().following()
-    node = action(monkeypatch, drives, drives.gateway.request)
-    before = drives.path[-1].tolist()
-    there = [axis.setpoint + 0.05 for axis in drives.axes]
-    wanted = message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)]))
-    goal = node.send(wanted, lambda: drives.gateway.command(StopRequest()))
-    drives.run(20)
-    node.watch()
+def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(bench: Bench) -> None:
+    """The acceptance is delayed for the client."""
+    before = bench.drives.path[-1].tolist()
+    goal = bench.send(meanwhile=lambda: bench.drives.gateway.command(StopRequest()))
+    bench.run(20)
+    bench.node.watch()
     assert goal.ending == 'aborted'
     assert 'stopped before it had begun' in goal.result.error_string
-    assert drives.path[-1].tolist() == before
-    node.send(wanted)
-    drives.run(300)
-    assert drives.path[-1].tolist() == pytest.approx(there)
+    assert bench.drives.path[-1].tolist() == before
 
 
-def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(bench: Bench) -> None:
     """As canceled, and nothing moves."""
-    worker = SteppedWorker()
-    drives = Drives(worker=worker).following()
-    node = action(monkeypatch, drives, drives.gateway.request)
-    before = drives.path[-1].tolist()
-    there = [axis.setpoint + 0.05 for axis in drives.axes]
-    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])))
-    drives.run(1)
-    node.cancel(goal)
-    worker.run()
-    drives.run(20)
-    node.watch()
+    before = bench.drives.path[-1].tolist()
+    goal = bench.send()
+    bench.drives.run(1)
+    bench.node.cancel(goal)
+    bench.run(20)
+    bench.node.watch()
     assert goal.ending == 'canceled'
     assert goal.result.error_code == GoalCode.SUCCESSFUL
-    assert drives.path[-1].tolist() == before
+    assert bench.drives.path[-1].tolist() == before
 
 
 def trajectory(drives: Drives) -> None:

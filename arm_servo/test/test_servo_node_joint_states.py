@@ -26,18 +26,19 @@ def ready() -> tuple[Drives, JointSamples]:
     return drives, JointSamples(drives.gateway.model.joints, {})
 
 
-def test_a_cycle_that_stands_still_makes_no_new_states() -> None:
-    """What it measured last keeps its time, and is published no more after a while."""
+def test_what_is_old_is_published_no_more() -> None:
+    """A last position does not pass for the present one; the others go on.
+
+    Of a cycle that stands still, of a drive that is silent, of a gripper beside the arm.
+    """
     drives, samples = ready()
-    cycle = drives.now
+    joints, cycle = list(drives.source.axes), drives.now
+    samples.receive(['gripper'], [0.04], [0.0], cycle)
     found = samples.fresh(drives.gateway.snapshot, cycle + 0.3)
+    assert list(found) == [*joints, 'gripper']
     assert {sample.time for sample in found.values()} == {cycle}
+    assert found['gripper'].position == 0.04
     assert samples.fresh(drives.gateway.snapshot, cycle + MAX_AGE + PERIOD) == {}
-
-
-def test_a_drive_that_is_silent_is_left_out() -> None:
-    """Its last position does not pass for the present one; the others go on."""
-    drives, samples = ready()
     drives.axes[2] = replace(drives.axes[2], age=0.3)
     drives.run()
     found = samples.fresh(drives.gateway.snapshot, drives.now)
@@ -45,18 +46,7 @@ def test_a_drive_that_is_silent_is_left_out() -> None:
     drives.axes[2] = replace(drives.axes[2], age=MAX_AGE + PERIOD)
     drives.run()
     found = samples.fresh(drives.gateway.snapshot, drives.now)
-    assert list(found) == [name for name in drives.source.axes if name != 'panda_joint3']
-
-
-def test_drives_beside_the_arm_are_there() -> None:
-    """A gripper is no joint of the group, and a joint of the robot."""
-    drives, samples = ready()
-    samples.receive(['gripper'], [0.04], [0.0], drives.now)
-    found = samples.fresh(drives.gateway.snapshot, drives.now)
-    assert list(found) == [*drives.source.axes, 'gripper']
-    assert found['gripper'].position == 0.04
-    found = samples.fresh(drives.gateway.snapshot, drives.now + MAX_AGE + PERIOD)
-    assert 'gripper' not in found
+    assert set(joints) - set(found) == {'panda_joint3'}
 
 
 def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
