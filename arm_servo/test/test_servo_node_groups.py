@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
@@ -14,6 +15,7 @@ from servo_commands import Drives, jog, PERIOD
 from servo_nodes import Listener
 
 from arm_model import CommandError, RobotModel
+from arm_model import PlanningScene as PlanningSceneModel
 from arm_servo import TargetRequest
 from arm_servo.core.gateway import MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
@@ -39,31 +41,34 @@ def texts() -> tuple[str, str, dict[str, dict[str, float]]]:
 
     Turned by a quarter towards each other they overlap; the gate is in the way at 0.
     """
-    arm, middle = '0.4 0.04 0.04', '0.2 0 0'
-    urdf = (
-        '<robot name="two"><link name="base"/>'
-        + _joint('left', 'revolute', '0 0.3 0', arm, middle)
-        + _joint('right', 'revolute', '0 -0.3 0', arm, middle)
-        + _joint('gate', 'prismatic', '0 0.6 0', '0.1 0.1 0.1', '0 0 0')
-        + '</robot>'
+    arm = ('0.4 0.04 0.04', '0.2 0 0')
+    joints = (
+        _joint('left', 'revolute', '0 0.3 0', *arm),
+        _joint('right', 'revolute', '0 -0.3 0', *arm),
+        _joint('gate', 'prismatic', '0 0.6 0', '0.1 0.1 0.1', '0 0 0'),
     )
+    urdf = f'<robot name="two"><link name="base"/>{"".join(joints)}</robot>'
     groups = ''.join(f'<group name="{side}"><joint name="{side}"/></group>' for side in ARMS)
     srdf = f'<robot name="two">{groups}<disable_collisions link1="x" link2="y"/></robot>'
-    limits = {side: {'max_acceleration': 5.0, 'max_jerk': 50.0} for side in ARMS}
-    return urdf, srdf, limits
+    return urdf, srdf, {side: {'max_acceleration': 5.0, 'max_jerk': 50.0} for side in ARMS}
+
+
+def matrix(names: Sequence[str], *, is_allowed: bool) -> PlanningScene:
+    """Return a scene in which links may all touch, or none."""
+    entry = AllowedCollisionEntry(enabled=[is_allowed] * len(names))
+    allowed = AllowedCollisionMatrix(entry_names=[*names], entry_values=[entry for _ in names])
+    return PlanningScene(allowed_collision_matrix=allowed)
 
 
 class Robot:
     """Both arms, and the listener that knows where they are."""
 
-    def __init__(self, left: float = 0.0, right: float = 0.0, gate: float = 1.0) -> None:
+    def __init__(self, right: float = 0.0, gate: float = 1.0) -> None:
         self.arms = {}  # drives of each arm
-        for side, other, at in (('left', 'right', left), ('right', 'left', right)):
+        for side, other, at in (('left', 'right', 0.0), ('right', 'left', right)):
             model = RobotModel(*texts(), side, moved_by_others={other: [other]})
-            self.arms[side] = Drives(model=model, begin=[at])
-            self.arms[side].attach()
-            self.arms[side].run(2)
-        self.listener = Listener(*self.arms.values())  # the listener
+            self.arms[side] = Drives(model=model, begin=[at]).following()
+        self.listener = Listener(*self.arms.values())
         self.place_gate(gate)
         self.run(0.3)
 
@@ -79,9 +84,27 @@ class Robot:
             if cycle % 10 == 9:
                 self.listener.run(0.1)
 
-    def scene(self, side: str = 'left') -> object:
-        """Return the scene that counts for an arm."""
-        return self.arms[side].gateway.model.scene
+    def take(self, scene: PlanningScene) -> None:
+        """Deliver the scene of a planner."""
+        self.listener.take(scene)
+        self.run(0.2)
+
+    def jog(self, side: str, velocity: float) -> None:
+        """Jog an arm for half a minute."""
+        arm = self.arms[side]
+        jog(arm.gateway, {side: velocity}, arm.now, 30.0)
+
+    @property
+    def scene(self) -> PlanningSceneModel:
+        """The scene that counts for the left arm."""
+        return self.arms['left'].gateway.model.scene
+
+    @property
+    def report(self) -> str:
+        """What limits the left arm."""
+        point = self.arms['left'].gateway.snapshot.set_point
+        assert point is not None
+        return str(point.report)
 
     def send(self, side: str, position: float) -> MotionCommand:
         """Send an arm to a place."""
@@ -92,14 +115,24 @@ class Robot:
         return float(self.arms[side].path[-1][0])
 
 
-@pytest.mark.parametrize('right', [0.0, QUARTER])
-def test_an_arm_does_not_move_into_another_that_rests(right: float) -> None:
-    """It is checked where it stands, not at 0: a target into it is refused with the pair."""
-    robot = Robot(right=right)
-    command = robot.send('left', -QUARTER)
+@pytest.mark.parametrize(
+    ('right', 'gate', 'to', 'link'),
+    [
+        (0.0, 1.0, -QUARTER, ''),
+        (QUARTER, 1.0, -QUARTER, 'right_link'),
+        (0.0, 1.0, QUARTER, ''),
+        (0.0, 0.0, QUARTER, 'gate_link'),
+    ],
+)
+def test_an_arm_does_not_move_into_what_rests_beside_it(
+    right: float, gate: float, to: float, link: str
+) -> None:
+    """Another arm, a joint without a group: checked where they stand, and not at 0."""
+    robot = Robot(right=right, gate=gate)
+    command = robot.send('left', to)
     robot.run(3.0)
-    if right:
-        with pytest.raises(CommandError, match='left_link and right_link would collide'):
+    if link:
+        with pytest.raises(CommandError, match=f'left_link and {link} would collide'):
             command.future.result(0.0)
         assert robot.at('left') == 0.0
     else:
@@ -109,27 +142,12 @@ def test_an_arm_does_not_move_into_another_that_rests(right: float) -> None:
 def test_a_jog_stops_in_front_of_an_arm_that_rests() -> None:
     """And the report names it."""
     robot = Robot(right=QUARTER)
-    left = robot.arms['left']
-    jog(left.gateway, {'left': -0.5}, left.now, 30.0)
+    robot.jog('left', -0.5)
     robot.run(5.0)
-    point = left.gateway.snapshot.set_point
-    assert point is not None
-    assert any('right_link' in limiter.name for limiter in point.report.limiters)
+    assert 'right_link' in robot.report
     assert -QUARTER < robot.at('left') < -0.5
+    left = robot.arms['left']
     assert left.gateway.model.clearance(left.path[-1]) > 0.0
-
-
-@pytest.mark.parametrize('gate', [0.0, 1.0])
-def test_a_joint_without_a_group_counts_where_its_joint_states_have_it(gate: float) -> None:
-    """A way that is clear is not refused for where the joint is not."""
-    robot = Robot(gate=gate)
-    command = robot.send('left', QUARTER)
-    robot.run(3.0)
-    if gate:
-        assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
-    else:
-        with pytest.raises(CommandError, match='left_link and gate_link would collide'):
-            command.future.result(0.0)
 
 
 @pytest.mark.parametrize('is_allowed', [True, False])
@@ -138,19 +156,13 @@ def test_arms_that_both_move_meet_only_where_the_scene_of_the_planner_lets_them(
 ) -> None:
     """Each stops in front of the other, and names it."""
     robot = Robot()
-    entries = [AllowedCollisionEntry(enabled=[is_allowed] * 2) for _ in ARMS]
-    names = [f'{side}_link' for side in ARMS]
-    matrix = AllowedCollisionMatrix(entry_names=names, entry_values=entries)
-    robot.listener.take(PlanningScene(allowed_collision_matrix=matrix))
-    robot.run(0.2)
-    for side, velocity in (('left', -0.5), ('right', 0.5)):
-        jog(robot.arms[side].gateway, {side: velocity}, robot.arms[side].now, 30.0)
+    robot.take(matrix(['left_link', 'right_link'], is_allowed=is_allowed))
+    robot.jog('left', -0.5)
+    robot.jog('right', 0.5)
     robot.run(3.2)
     here = {side: robot.at(side) for side in ARMS} | {'gate': 1.0}
     distance = RobotModel(*texts(), 'left').with_others(here).clearance(np.array([here['left']]))
-    point = robot.arms['left'].gateway.snapshot.set_point
-    assert point is not None
-    assert ('right_link' in str(point.report)) != is_allowed
+    assert ('right_link' in robot.report) != is_allowed
     assert (distance > 0.0) != is_allowed
 
 
@@ -170,50 +182,35 @@ def test_arms_that_move_at_the_same_time_are_checked_once_one_rests() -> None:
     assert robot.at('right') == pytest.approx(QUARTER, abs=1e-6)
 
 
-def test_noise_of_a_joint_beside_the_group_makes_no_new_scene() -> None:
-    """What was prepared stays valid."""
+def test_a_joint_that_moves_beside_the_group_makes_few_scenes() -> None:
+    """Noise none: what was prepared stays valid. One in half a second, and the last at rest."""
     robot = Robot()
-    scene = robot.scene()
+    scene, scenes = robot.scene, set()
     for number in range(20):
         robot.place_gate(1.0 + 4e-4 * (-1) ** number)
         robot.run(0.1)
-    assert robot.scene() is scene
-    robot.place_gate(1.1)
-    robot.run(0.2)
-    assert robot.scene() is not scene
-
-
-def test_a_joint_that_moves_beside_the_group_makes_few_scenes() -> None:
-    """One in half a second, and the last where it came to rest."""
-    robot = Robot()
-    scenes = set()
+    assert robot.scene is scene
     for number in range(30):
         robot.place_gate(1.0 + 0.01 * number)
         robot.run(0.1)
-        scenes.add(robot.scene())
+        scenes.add(robot.scene)
     assert 5 <= len(scenes) <= 7
     robot.run(0.2)
-    kinematics = robot.arms['left'].gateway.model.scene.kinematics
-    assert kinematics.others['gate'] == pytest.approx(1.29)
+    assert robot.scene.kinematics.others['gate'] == pytest.approx(1.29)
 
 
 def test_the_scene_of_a_planner_leaves_the_joints_where_they_are() -> None:
     """Its matrix has all links; the other arm is checked all the same, and only where it rests."""
     robot = Robot(right=QUARTER)
-    entry = AllowedCollisionEntry(enabled=[False] * len(LINKS))
-    matrix = AllowedCollisionMatrix(entry_names=list(LINKS), entry_values=[entry for _ in LINKS])
-    robot.listener.take(PlanningScene(allowed_collision_matrix=matrix))
-    robot.run(0.2)
+    robot.take(matrix(LINKS, is_allowed=False))
     command = robot.send('left', -QUARTER)
     robot.run(0.5)
     with pytest.raises(CommandError, match='left_link and right_link would collide'):
         command.future.result(0.0)
-    away = robot.send('right', 0.0)
-    robot.run(4.0)
-    assert away.ended.result(0.0).code is GoalCode.SUCCESSFUL
-    command = robot.send('left', -QUARTER)
-    robot.run(3.0)
-    assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
+    for side, to in (('right', 0.0), ('left', -QUARTER)):
+        command = robot.send(side, to)
+        robot.run(4.0)
+        assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
 
 
 def test_a_joint_of_which_nothing_is_known_is_named_once() -> None:

@@ -227,17 +227,19 @@ def test_it_reports_what_moves_the_arm_and_why_it_does_not() -> None:
     """A refusal first of all, with the remedy; a cycle that stands still is no news."""
     drives = Drives().following()
 
-    def status(*words: str, age: float = 0.0, cycles: int = 3) -> tuple[int, str]:
-        drives.run(cycles)
-        return status_of(drives.gateway.snapshot, *(words or ('', '', '')), age)
+    def status(
+        refusal: str = '', paused: str = '', capped: str = '', age: float = 0.0
+    ) -> tuple[int, str]:
+        drives.run(3)
+        return status_of(drives.gateway.snapshot, refusal, paused, capped, age)
 
     assert status() == (ServoStatus.NO_WARNING, 'ready')
     assert status('stale', 'paused', 'cut') == (ServoStatus.INVALID, 'stale')
-    assert status('', 'paused', 'cut') == (ServoStatus.NO_WARNING, 'paused')
+    assert status(paused='paused', capped='cut') == (ServoStatus.NO_WARNING, 'paused')
     move_by(drives.gateway, {'panda_joint1': 0.3})
     assert 'target' in status()[1]
     twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
-    assert status('', '', 'cut to 1')[1].startswith('cut to 1')
+    assert status(capped='cut to 1')[1].startswith('cut to 1')
     code, words = status(age=3.0)
     assert code == ServoStatus.INVALID
     assert '3.0 s ago' in words
