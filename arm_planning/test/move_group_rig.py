@@ -43,8 +43,6 @@ from shape_msgs.msg import SolidPrimitive
 from urdf_reader import expand_xacro
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from isolation import Isolation
     from typing_extensions import Self
 
@@ -69,30 +67,31 @@ def moveit_package(name: str, folder: Path) -> Path:
     path = folder / f'{name}_moveit_config'
     shutil.copytree(PACKAGES / name, path)
     source, root = SEMANTICS[name]
-    virtual = (
-        '<virtual_joint name="virtual_joint" type="fixed" parent_frame="world"'
-        f' child_link="{root}"/></robot>'
-    )
+    world = 'name="virtual_joint" type="fixed" parent_frame="world"'
+    virtual = f'<virtual_joint {world} child_link="{root}"/></robot>'
     srdf = (robots() / source).read_text(encoding='utf-8').replace('</robot>', virtual)
     (path / 'config' / f'{name}.srdf').write_text(srdf, encoding='utf-8')
     return path
 
 
-def panda_parameters(folder: Path, **others: object) -> Path:
+def panda_parameters(folder: Path, joint_limits: Path | None = None) -> Path:
     """Write what describes the Panda, with soft limits of its last joint, as a parameter file."""
     panda = robots() / 'panda'
     last = '<child link="panda_link7"/>'
     soft = '<safety_controller k_velocity="20" soft_lower_limit="-2.5" soft_upper_limit="2.5"/>'
     urdf = expand_xacro(panda / 'panda.urdf.xacro')
     assert urdf.count(last) == 1
-    values = {
-        'robot_description': urdf.replace(last, last + soft),
-        'robot_description_semantic': (panda / 'panda.srdf').read_text(encoding='utf-8'),
-        'joint_limits': str(panda / 'limits.yaml'),
-        **others,
-    }
-    path = folder / 'panda.json'  # JSON is YAML
-    path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
+    srdf = (panda / 'panda.srdf').read_text(encoding='utf-8')
+    limits = joint_limits or panda / 'limits.yaml'
+    return parameter_file(folder, urdf.replace(last, last + soft), srdf, limits)
+
+
+def parameter_file(folder: Path, urdf: str, srdf: str, limits: Path) -> Path:
+    """Write what describes a robot as a parameter file."""
+    values = {'robot_description': urdf, 'robot_description_semantic': srdf}
+    path = folder / 'robot.json'  # JSON is YAML
+    parameters = {**values, 'joint_limits': str(limits)}
+    path.write_text(json.dumps({'/**': {'ros__parameters': parameters}}), encoding='utf-8')
     return path
 
 
@@ -130,7 +129,7 @@ class MoveGroupRig:
             self.process.wait_until_ready(TIMEOUT)
             self._wait_for_states()
         except BaseException:
-            self.__exit__(None, None, None)
+            self.__exit__(*[None] * 3)
             raise
 
     def _wait_for_states(self) -> None:
@@ -152,23 +151,17 @@ class MoveGroupRig:
             self.client.spin_for(0.02)  # joint states are published
         raise TimeoutError('move_group does not receive where the robot is')
 
-    def _serve(
-        self, kind: Any, name: str, follow: Callable[[Any], Any], *, holds: bool
-    ) -> ActionServer:
-        accept = self.held.append if holds else lambda handle: handle.execute()
-        return ActionServer(  # type: ignore[no-untyped-call]
-            self.client.node,
-            kind,
-            name,
-            follow,
-            handle_accepted_callback=accept,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+    def _serve(self, kind: Any, name: str, follow: Callable[[Any], Any], holds: bool) -> Any:
+        callbacks: dict[str, Any] = {
+            'handle_accepted_callback': self.held.append if holds else lambda each: each.execute(),
+            'cancel_callback': lambda _: CancelResponse.ACCEPT,
+        }
+        return ActionServer(self.client.node, kind, name, follow, **callbacks)  # type: ignore[no-untyped-call]
 
     def serve_arm(self, name: str, *, holds: bool = False) -> Any:
         """Offer a trajectory controller; one that holds leaves its goals in :attr:`held`."""
         action = f'/{name}/follow_joint_trajectory'
-        return self._serve(FollowJointTrajectory, action, self._follow, holds=holds)
+        return self._serve(FollowJointTrajectory, action, self._follow, holds)
 
     def serve_gripper(self, name: str, joint: str, *, holds: bool = False) -> Any:
         """Offer a gripper of one joint."""
@@ -179,7 +172,7 @@ class MoveGroupRig:
             handle.succeed()
             return GripperCommand.Result(reached_goal=True)
 
-        return self._serve(GripperCommand, f'/{name}/gripper_cmd', grip, holds=holds)
+        return self._serve(GripperCommand, f'/{name}/gripper_cmd', grip, holds)
 
     def _follow(self, handle: Any) -> FollowJointTrajectory.Result:
         if handle.is_cancel_requested:
@@ -290,15 +283,10 @@ class MoveGroupRig:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """End it."""
-        self.process.__exit__(exc_type, exc, traceback)
-        self.client.__exit__(exc_type, exc, traceback)
+        self.process.__exit__(*exception)  # type: ignore[arg-type]
+        self.client.__exit__(*exception)
 
 
 def change(**parts: Any) -> PlanningScene:
@@ -310,15 +298,10 @@ def change(**parts: Any) -> PlanningScene:
 
 def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> Constraints:
     """Return a goal of joints, as MoveGroupInterface makes it."""
+    within = {'tolerance_above': 1e-4, 'tolerance_below': 1e-4, 'weight': 1.0}
     return Constraints(
         joint_constraints=[
-            JointConstraint(
-                joint_name=name,
-                position=position,
-                tolerance_above=1e-4,
-                tolerance_below=1e-4,
-                weight=1.0,
-            )
+            JointConstraint(joint_name=name, position=position, **within)
             for name, position in zip(joints, positions, strict=True)
         ]
     )
@@ -327,15 +310,13 @@ def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> Co
 def pose_goal(pose: PoseMessage, link: str, frame: str) -> Constraints:
     """Return a goal of a pose, as MoveGroupInterface makes it."""
     place = PositionConstraint(link_name=link, weight=1.0)
-    place.header.frame_id = frame
-    place.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1e-4])
-    ]
+    ball = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1e-4])
+    place.constraint_region.primitives = [ball]
     place.constraint_region.primitive_poses = [PoseMessage(position=pose.position)]
     turn = OrientationConstraint(link_name=link, orientation=pose.orientation, weight=1.0)
-    turn.header.frame_id = frame
     turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = 1e-3
     turn.absolute_z_axis_tolerance = 1e-3
+    place.header.frame_id = turn.header.frame_id = frame
     return Constraints(position_constraints=[place], orientation_constraints=[turn])
 
 
@@ -343,13 +324,8 @@ def motion_request(
     goal: Constraints, group: str = 'panda_arm', **others: Any
 ) -> MotionPlanRequest:
     """Return a request from where the robot is."""
-    request = MotionPlanRequest(
-        group_name=group,
-        goal_constraints=[goal],
-        num_planning_attempts=1,
-        allowed_planning_time=10.0,
-        **others,
-    )
+    fields: dict[str, Any] = {'num_planning_attempts': 1, 'allowed_planning_time': 10.0}
+    request = MotionPlanRequest(group_name=group, goal_constraints=[goal], **fields | others)
     request.start_state.is_diff = True
     return request
 
@@ -358,6 +334,5 @@ def action_goal(request: MotionPlanRequest, *, plan_only: bool = False) -> MoveG
     """Return a goal of move_action, as MoveGroupInterface makes it."""
     goal = MoveGroup.Goal(request=request)
     goal.planning_options.plan_only = plan_only
-    goal.planning_options.planning_scene_diff.is_diff = True
-    goal.planning_options.planning_scene_diff.robot_state.is_diff = True
+    goal.planning_options.planning_scene_diff = change()
     return goal

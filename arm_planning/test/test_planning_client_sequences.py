@@ -9,6 +9,7 @@ pymoveit2, which have a node of their own and no robot model.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import deepcopy
 import math
 from typing import Any
@@ -47,7 +48,7 @@ from moveit_msgs.srv import (
     QueryPlannerInterfaces,
 )
 import numpy as np
-from planning_messages import box, panda, tetrahedron
+from planning_messages import box, panda, pose_at, tetrahedron
 import pytest
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
@@ -101,11 +102,8 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
         rig.client.spin_until(rig.client.action(kind, name).server_is_ready, 20.0, name)
     # plan(): look_around and replan are off
     goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
-    states: list[str] = []
-    handle = rig.send(
-        MoveGroup, '/move_action', goal, lambda each: states.append(each.feedback.state)
-    )
-    result = handle.get_result_async()
+    received: list[Any] = []
+    result = rig.send(MoveGroup, '/move_action', goal, received.append).get_result_async()
     rig.client.spin_until(result.done, 60.0, 'plan')
     assert result.result().status == GoalStatus.STATUS_SUCCEEDED
     plan = result.result().result
@@ -118,14 +116,11 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     assert (list(trajectory.joint_names), trajectory.header.frame_id) == (JOINTS, BASE)
     assert not plan.executed_trajectory.joint_trajectory.points
     # the first one may leave before the server has found the client's subscription
-    assert states in (['PLANNING', 'IDLE'], ['IDLE'])
+    assert [each.feedback.state for each in received] in (['PLANNING', 'IDLE'], ['IDLE'])
     assert not rig.followed
     # execute()
-    status, executed = rig.run(
-        ExecuteTrajectory,
-        '/execute_trajectory',
-        ExecuteTrajectory.Goal(trajectory=plan.planned_trajectory),
-    )
+    planned = ExecuteTrajectory.Goal(trajectory=plan.planned_trajectory)
+    status, executed = rig.run(ExecuteTrajectory, '/execute_trajectory', planned)
     assert (status, executed.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
     assert at(rig) == pytest.approx(MOVED, abs=1e-3)
     # setPoseTarget() and move(): the frame of the model
@@ -143,19 +138,6 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     answer = rig.cartesian_path(down, avoid_collisions=True)
     assert (answer.error_code.val, answer.fraction) == (SUCCESS, 1.0), answer.error_code
     assert list(answer.start_state.joint_state.position)[:7] == pytest.approx(at(rig))
-
-
-def test_a_cartesian_path_ends_in_front_of_what_stands_between_its_places(
-    rig: MoveGroupRig,
-) -> None:
-    """A post between two steps of the hand."""
-    ahead = rig.fk()
-    rig.add(box('post', ahead.position.x + 0.15, 0.0, ahead.position.z, edge=0.06))
-    ahead.position.x += 0.3
-    answer = rig.cartesian_path(ahead, avoid_collisions=True, max_step=0.5)
-    assert answer.error_code.val == SUCCESS, answer.error_code
-    assert answer.fraction == 0.0  # of one step
-    assert 'post' in answer.error_code.message
 
 
 def test_a_start_just_beyond_a_limit_is_on_it(rig: MoveGroupRig) -> None:
@@ -220,25 +202,19 @@ def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
 
 def test_a_circle_leads_through_its_point(rig: MoveGroupRig) -> None:
     """As Pilz' planner has it in the path constraints."""
-    begin = rig.fk()
-    goal, middle = deepcopy(begin), deepcopy(begin)
+    goal, middle = rig.fk(), rig.fk()
     goal.position.y += 0.2
-    middle.position.y, middle.position.z = begin.position.y + 0.1, begin.position.z - 0.05
+    middle.position.y, middle.position.z = middle.position.y + 0.1, middle.position.z - 0.05
     circle = pose_goal(middle, HAND, BASE)
     circle.name, circle.orientation_constraints = 'interim', []
-    request = motion_request(
-        pose_goal(goal, HAND, BASE),
-        pipeline_id='pilz_industrial_motion_planner',
-        planner_id='CIRC',
-        path_constraints=circle,
-    )
+    names = {'pipeline_id': 'pilz_industrial_motion_planner', 'planner_id': 'CIRC'}
+    request = motion_request(pose_goal(goal, HAND, BASE), path_constraints=circle, **names)
     response = rig.plan(request)
     assert response.error_code.val == SUCCESS, response.error_code
     fk = Planner(panda().model('panda_arm')).fk
     rows = [frozen(each.positions) for each in response.trajectory.joint_trajectory.points]
     way = np.array([fk(row, HAND).position for row in rows])
-    through = [middle.position.x, middle.position.y, middle.position.z]
-    assert np.linalg.norm(way - through, axis=1).min() < 0.02
+    assert np.linalg.norm(way - placed(middle).position, axis=1).min() < 0.02
 
 
 def test_planning_scene_interface(rig: MoveGroupRig) -> None:
@@ -284,10 +260,8 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     displayed = rig.client.listen(DisplayTrajectory, '/display_planned_path', 2)
     whole = rig.scene((1 << 10) - 1)
     assert not whole.is_diff
-    assert (whole.robot_model_name, whole.robot_state.joint_state.header.frame_id) == (
-        'panda',
-        BASE,
-    )
+    frame = whole.robot_state.joint_state.header.frame_id
+    assert (whole.robot_model_name, frame) == ('panda', BASE)
     assert whole.allowed_collision_matrix.entry_names
     described = rig.client.call(
         QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
@@ -299,12 +273,10 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     whole.world.collision_objects = [box('crate', 0.0, 0.8, 0.2, edge=0.2)]
     publisher.publish(whole)
 
-    def has_crate() -> bool:
-        return bool(monitored) and [each.id for each in monitored[-1].world.collision_objects] == [
-            'crate'
-        ]
+    def shown() -> list[str]:
+        return [each.id for each in monitored[-1].world.collision_objects] if monitored else []
 
-    rig.client.spin_until(has_crate, 30.0, 'the scene with the crate')
+    rig.client.spin_until(lambda: shown() == ['crate'], 30.0, 'the scene with the crate')
     # Plan with what the panel has in its start state, then Execute
     asked = interface_request(joint_goal(MOVED))
     asked.start_state = deepcopy(whole.robot_state)
@@ -318,9 +290,7 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     rig.publisher(String, '/trajectory_execution_event').publish(String(data='stop'))
     rig.client.call(Empty, '/clear_octomap', Empty.Request())
     publisher.publish(PlanningScene())
-    rig.client.spin_until(
-        lambda: not monitored[-1].world.collision_objects, 30.0, 'the scene without it'
-    )
+    rig.client.spin_until(lambda: not shown(), 30.0, 'the scene without it')
 
 
 def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
@@ -350,8 +320,8 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     solved = rig.ik(pose, BASE, avoid_collisions=True, robot_state=start)
     assert solved.error_code.val == SUCCESS, solved.error_code
     found = rig.fk(HAND, solved.solution).position
-    assert (found.x, found.y, found.z) == pytest.approx(
-        (pose.position.x, pose.position.y, pose.position.z), abs=1e-4
+    assert placed(PoseMessage(position=found)).position == pytest.approx(
+        placed(pose).position, abs=1e-4
     )
     # allow_collisions(): the scene is read, its matrix widened, and sent back as a whole
     publisher = rig.publisher(CollisionObject, '/collision_object')
@@ -400,19 +370,16 @@ def test_goals_and_path_constraints_of_what_is_held(
     goal = pose_goal(wanted, name, BASE)
     request = interface_request(goal)
     kept = deepcopy(goal.position_constraints[0])
-    kept.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.04, 0.2, 0.3])
-    ]
-    kept.constraint_region.primitive_poses = [pose_message(begin)]
-    kept.constraint_region.primitive_poses[0].orientation = Quaternion(w=1.0)
+    slab = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.04, 0.2, 0.3])
+    kept.constraint_region.primitives = [slab]
+    kept.constraint_region.primitive_poses = [pose_at(*begin.position.tolist())]
     request.path_constraints.position_constraints = [kept]
     if not turned:
         goal.orientation_constraints = []
     _status, moved = rig.move(action_goal(request))
     assert moved.error_code.val == SUCCESS, moved.error_code
-    assert (place_of(at(rig)).position - begin.position).tolist() == pytest.approx(
-        [0.0, 0.06, 0.08], abs=1e-3
-    )
+    way = (place_of(at(rig)).position - begin.position).tolist()
+    assert way == pytest.approx([0.0, 0.06, 0.08], abs=1e-3)
     if turned:
         assert place_of(at(rig)).rotation == pytest.approx(begin.rotation, abs=2e-3)
     kept.constraint_region.primitive_poses[0].position.x += 0.1
@@ -422,54 +389,46 @@ def test_goals_and_path_constraints_of_what_is_held(
 
 def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroupRig) -> None:
     """Defaults stay defaults, the upper triangle counts, REMOVE forgets what a name may touch."""
-    place = rig.fk().position
+    place, touching = rig.fk().position, MoveItErrorCodes.START_STATE_IN_COLLISION
 
-    def cup(operation: bytes) -> CollisionObject:
-        return box('cup', place.x, place.y, place.z, edge=0.05, operation=operation)
+    def cup(operation: bytes) -> None:
+        rig.add(box('cup', place.x, place.y, place.z, edge=0.05, operation=operation))
 
-    def outcome() -> int:
+    def outcome(matrix: Any) -> int:
+        assert rig.apply(allowed_collision_matrix=matrix)
         return int(rig.plan(motion_request(joint_goal(READY))).error_code.val)
 
-    touching = MoveItErrorCodes.START_STATE_IN_COLLISION
-    rig.add(cup(CollisionObject.ADD))
-    assert outcome() == touching
+    cup(CollisionObject.ADD)
     matrix = rig.scene().allowed_collision_matrix
-    entries = len(matrix.entry_names)
+    names = list(matrix.entry_names)
+    assert outcome(matrix) == touching
     matrix.default_entry_names, matrix.default_entry_values = ['cup'], [True]
-    assert rig.apply(allowed_collision_matrix=matrix)
-    assert outcome() == SUCCESS
-    matrix = rig.scene().allowed_collision_matrix
-    assert (list(matrix.default_entry_names), list(matrix.default_entry_values)) == (
-        ['cup'],
-        [True],
-    )
-    assert rig.apply(allowed_collision_matrix=matrix)  # what was read
-    matrix.default_entry_values = [False]
-    kept = [number for number, name in enumerate(matrix.entry_names) if name != 'cup']
-    matrix.entry_names = [matrix.entry_names[number] for number in kept]
-    matrix.entry_values = [
-        AllowedCollisionEntry(enabled=[matrix.entry_values[row].enabled[each] for each in kept])
-        for row in kept
-    ]
-    assert len(kept) == entries
-    assert rig.apply(allowed_collision_matrix=matrix)
-    assert outcome() == touching
-    matrix.default_entry_names, matrix.default_entry_values = [], []
+    assert outcome(matrix) == SUCCESS
+    read = rig.scene().allowed_collision_matrix
+    assert (list(read.default_entry_names), list(read.default_entry_values)) == (['cup'], [True])
+    assert outcome(read) == SUCCESS
+    kept = [number for number, name in enumerate(read.entry_names) if name != 'cup']
+    read.entry_names = [read.entry_names[number] for number in kept]
+    rows = [[read.entry_values[row].enabled[each] for each in kept] for row in kept]
+    read.entry_values = [AllowedCollisionEntry(enabled=row) for row in rows]
+    read.default_entry_values = [False]
+    assert list(read.entry_names) == names
+    assert outcome(read) == touching
+    read.default_entry_names, read.default_entry_values = [], []
     for is_upper in (True, False):
-        filled = deepcopy(matrix)
-        filled.entry_names = [*filled.entry_names, 'cup']
+        filled = deepcopy(read)
+        filled.entry_names = [*names, 'cup']
         for row in filled.entry_values:
             row.enabled = [*row.enabled, is_upper]
-        filled.entry_values.append(
-            AllowedCollisionEntry(enabled=[*([not is_upper] * entries), False])
-        )
+        last = [*([not is_upper] * len(names)), False]
+        filled.entry_values.append(AllowedCollisionEntry(enabled=last))
         for _ in range(2):  # the second one says nothing new
-            assert rig.apply(allowed_collision_matrix=filled)
-            assert outcome() == (SUCCESS if is_upper else touching)
-        rig.add(cup(CollisionObject.REMOVE))
-        rig.add(cup(CollisionObject.ADD))
-        assert outcome() == touching
-        assert rig.scene().allowed_collision_matrix == matrix
+            assert outcome(filled) == (SUCCESS if is_upper else touching)
+        cup(CollisionObject.REMOVE)
+        cup(CollisionObject.ADD)
+        found = rig.scene().allowed_collision_matrix
+        assert found == read
+        assert outcome(found) == touching
 
 
 def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
@@ -478,16 +437,7 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     collisions = rig.client.listen(PlanningScene, '/collision_scene', LATCHED)
     draw = np.random.default_rng(0).normal(size=(3000, 3))
     points = 0.2 * draw / np.linalg.norm(draw, axis=1, keepdims=True)
-    rock = CollisionObject(id='rock', pose=PoseMessage(position=Point(y=0.9)))
-    rock.header.frame_id = BASE
-    faces = np.arange(3000).reshape(-1, 3).tolist()
-    rock.meshes = [
-        Mesh(
-            vertices=[Point(x=x, y=y, z=z) for x, y, z in points.tolist()],
-            triangles=[MeshTriangle(vertex_indices=face) for face in faces],
-        )
-    ]
-    rig.add(rock)
+    rig.add(in_base('rock', mesh(points.tolist(), np.arange(3000).reshape(-1, 3).tolist())))
 
     def rocks(scenes: list[PlanningScene]) -> list[Mesh]:
         return [each.meshes[0] for each in scenes[-1].world.collision_objects] if scenes else []
@@ -506,12 +456,27 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     assert len(collisions) == before + 1
 
 
+def mesh(corners: Sequence[Sequence[float]], faces: Sequence[Sequence[int]]) -> Mesh:
+    """Return a mesh."""
+    vertices = [Point(x=x, y=y, z=z) for x, y, z in corners]
+    return Mesh(vertices=vertices, triangles=[MeshTriangle(vertex_indices=each) for each in faces])
+
+
+def in_base(name: str, shape: Mesh) -> CollisionObject:
+    """Return an object of a mesh, beside the arm."""
+    thing = CollisionObject(id=name, pose=pose_at(-0.5, 0.9), meshes=[shape])
+    thing.header.frame_id = BASE
+    return thing
+
+
 def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
     """That it counts as its hull; a convex one is not."""
-    corner = CollisionObject(id='corner', pose=PoseMessage(position=Point(x=-0.5, y=0.9)))
-    corner.header.frame_id = BASE
-    solid = corner_mesh()
-    corner.meshes = [solid]
+    outline = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.6), (0.0, 0.6)]
+    faces = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 5, 4)]
+    faces += [(8, 6, 7), (9, 6, 8), (10, 6, 9), (11, 6, 10)]
+    for one, other in zip(range(6), (1, 2, 3, 4, 5, 0), strict=True):
+        faces += [(one, other, 6 + other), (one, 6 + other, 6 + one)]
+    corner = in_base('corner', mesh([(x, y, z) for z in (0.0, 0.2) for x, y in outline], faces))
     rig.add(corner)
     note = "object 'corner' counts as the convex hull of its mesh, of which it fills 71 %"
     rig.process.wait_for(note, 30.0)
@@ -519,30 +484,14 @@ def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
     assert note in rig.move(goal)[1].error_code.message
     # the tip is in the corner, which is empty
     place = rig.fk().position
-    corner.pose.position = Point(x=place.x - 0.35, y=place.y - 0.35, z=place.z - 0.1)
+    corner.pose = pose_at(place.x - 0.35, place.y - 0.35, place.z - 0.1)
     rig.add(corner)
     refused = rig.move(goal)[1].error_code
     assert refused.val == MoveItErrorCodes.START_STATE_IN_COLLISION
     assert note in refused.message
-    corner.meshes = [tetrahedron(0.2)]
-    corner.pose.position = Point(x=-0.5, y=0.9)
-    rig.add(corner)
+    rig.add(in_base('corner', tetrahedron(0.2)))
     answer = rig.move(goal)[1].error_code
     assert (answer.val, answer.message) == (SUCCESS, '')
-
-
-def corner_mesh() -> Mesh:
-    """Return a prism with the outline of an L."""
-    outline = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.6), (0.0, 0.6)]
-    count = len(outline)
-    corners = [Point(x=x, y=y, z=z) for z in (0.0, 0.2) for x, y in outline]
-    caps = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 5, 4)]
-    faces = [*caps, *(tuple(count + each for each in reversed(cap)) for cap in caps)]
-    for one in range(count):
-        other = (one + 1) % count
-        faces += [(one, other, count + other), (one, count + other, count + one)]
-    triangles = [MeshTriangle(vertex_indices=list(face)) for face in faces]
-    return Mesh(vertices=corners, triangles=triangles)
 
 
 def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> None:
@@ -567,16 +516,11 @@ def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> No
 def test_items_of_a_sequence_begin_where_the_one_before_ends(rig: MoveGroupRig) -> None:
     """Joints that a goal leaves out, and poses in the frame of the hand."""
     lifted = PoseMessage(position=Point(z=-0.05), orientation=Quaternion(w=1.0))
-    goals = [
-        joint_goal([0.4], JOINTS[:1]),
-        joint_goal([0.2], JOINTS[-1:]),
-        pose_goal(lifted, HAND, HAND),
-    ]
+    goals = [joint_goal([0.4], JOINTS[:1]), joint_goal([0.2], JOINTS[-1:])]
+    requests = [motion_request(each, planner_id='PTP') for each in goals]
+    requests.append(motion_request(pose_goal(lifted, HAND, HAND), planner_id='LIN'))
     asked = GetMotionSequence.Request()
-    asked.request.items = [
-        MotionSequenceItem(req=motion_request(goal, planner_id=kind))
-        for goal, kind in zip(goals, ('PTP', 'PTP', 'LIN'), strict=True)
-    ]
+    asked.request.items = [MotionSequenceItem(req=each) for each in requests]
     answer = rig.client.call(GetMotionSequence, '/plan_sequence_path', asked).response
     assert answer.error_code.val == SUCCESS, answer.error_code
     end = answer.planned_trajectories[0].joint_trajectory.points[-1].positions

@@ -9,10 +9,14 @@ between the points of a trajectory are computed here.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
+from functools import partial
 import math
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import Quaternion
 from model_robots import forward
 from move_group_rig import (
     action_goal,
@@ -21,19 +25,19 @@ from move_group_rig import (
     JOINTS,
     motion_request,
     MoveGroupRig,
+    pose_goal,
     READY,
     robots,
 )
 from moveit_msgs.msg import (
     Constraints,
-    JointConstraint,
     MotionPlanRequest,
     MoveItErrorCodes,
     OrientationConstraint,
-    PositionConstraint,
 )
 import numpy as np
 from numpy.typing import NDArray
+import pinocchio as pin
 from planning_messages import pose_at
 import pytest
 from shape_msgs.msg import SolidPrimitive
@@ -45,6 +49,7 @@ Array = NDArray[np.float64]
 START = READY
 GOAL = [0.303, 0.397, 1.997, -1.993, -0.37, 1.805, 1.306]
 """Another state in which the hand looks down in [rad]; it does not on the straight way there."""
+BASE = 'panda_link0'
 STEP = 4e-3  # time between two looks in [s]
 URDF = ET.fromstring(expand_xacro(robots() / 'panda' / 'panda.urdf.xacro'))  # noqa: S314
 
@@ -57,21 +62,19 @@ def hand(positions: Array) -> Array:
 def between(first: Any, second: Any, times: Array) -> Array:
     """Return positions on the quintic between two points of a trajectory."""
     begin, end = seconds(first.time_from_start), seconds(second.time_from_start)
-    lasts = end - begin
-    powers = np.array([[lasts**n for n in range(6)]])
-    rates = np.array([[n * lasts ** (n - 1) if n else 0.0 for n in range(6)]])
-    bends = np.array([[n * (n - 1) * lasts ** (n - 2) if n > 1 else 0.0 for n in range(6)]])
-    start = np.eye(6)[:3] * np.array([[1.0], [1.0], [2.0]])
-    matrix = np.vstack([start, powers, rates, bends])
-    given = np.array(
-        [
-            *(first.positions, first.velocities, first.accelerations),
-            *(second.positions, second.velocities, second.accelerations),
+
+    def rows(time: float) -> Array:
+        """Return the powers of a time, and their first and second derivative."""
+        powers = [
+            [math.perm(n, order) * time ** max(n - order, 0) for n in range(6)]
+            for order in range(3)
         ]
-    )
-    coefficients = np.linalg.solve(matrix, given)
-    local = (times - begin)[:, None] ** np.arange(6)
-    return np.asarray(local @ coefficients)
+        return np.array(powers)
+
+    ends = [(each.positions, each.velocities, each.accelerations) for each in (first, second)]
+    matrix = np.vstack([rows(0.0), rows(end - begin)])
+    coefficients = np.linalg.solve(matrix, np.vstack(ends))
+    return np.asarray((times - begin)[:, None] ** np.arange(6) @ coefficients)
 
 
 def states(trajectory: Any) -> Array:
@@ -85,88 +88,59 @@ def states(trajectory: Any) -> Array:
     return np.vstack(found)
 
 
-def euler(rotation: Array) -> Array:
-    """Return the angles about x, the new y and the new z."""
-    return np.array(
-        [
-            math.atan2(-rotation[1, 2], rotation[2, 2]),
-            math.asin(max(-1.0, min(1.0, rotation[0, 2]))),
-            math.atan2(-rotation[0, 1], rotation[0, 0]),
-        ]
-    )
+def angles(rotation: Array) -> dict[int, Array]:
+    """Return the rotation vector, and the angles about x, the new y and the new z."""
+    (_, _, y), (_, _, x), (_, _, w) = rotation.tolist()
+    found = [math.atan2(-x, w), math.asin(max(-1.0, min(1.0, y)))]
+    return {
+        OrientationConstraint.XYZ_EULER_ANGLES: np.array(found),
+        OrientationConstraint.ROTATION_VECTOR: pin.log3(rotation),
+    }
 
 
-def vector(rotation: Array) -> Array:
-    """Return the rotation vector, by the angle and the skew part."""
-    angle = math.acos(max(-1.0, min(1.0, 0.5 * (np.trace(rotation) - 1.0))))
-    skew = np.array(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    return skew * (angle / (2.0 * math.sin(angle)) if angle > 1e-9 else 0.5)
+def cases() -> dict[str, tuple[Constraints, Callable[[Array], float]]]:
+    """Return constraints, and by how much a state misses them.
 
+    The hand looks down; a point 0.1 m below the flange stays in a box above 0.4 m; a joint stays
+    between two positions that are not as far on either side.
+    """
+    down = PoseMessage(orientation=Quaternion(x=1.0, w=0.0))
+    level = pose_goal(down, HAND, BASE).orientation_constraints[0]
+    level.absolute_x_axis_tolerance = level.absolute_y_axis_tolerance = 0.3
+    level.absolute_z_axis_tolerance = math.pi
+    vector = deepcopy(level)
+    vector.parameterization = OrientationConstraint.ROTATION_VECTOR
+    place = pose_goal(pose_at(0.0, 0.0, 0.6), HAND, BASE).position_constraints[0]
+    place.target_point_offset.z = 0.1
+    slab = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[2.0, 2.0, 0.4])
+    place.constraint_region.primitives = [slab]
+    joint = joint_goal([-2.2], ['panda_joint4'])
+    joint.joint_constraints[0].tolerance_above = 0.35
+    joint.joint_constraints[0].tolerance_below = 0.2
 
-DOWN = np.diag([1.0, -1.0, -1.0])  # the hand looks down
-
-
-def keeps_level(parameterization: int) -> tuple[Constraints, Callable[[Array], float]]:
-    """Return that the hand looks down, and by how much a state misses that."""
-    turn = OrientationConstraint(link_name=HAND, weight=1.0, parameterization=parameterization)
-    turn.header.frame_id = 'panda_link0'
-    turn.orientation.x, turn.orientation.w = 1.0, 0.0
-    turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = 0.3
-    turn.absolute_z_axis_tolerance = math.pi
-    angles = vector if parameterization else euler
-
-    def beyond(positions: Array) -> float:
-        turned = angles(DOWN.T @ hand(positions)[:3, :3])
+    def tilted(kind: int, positions: Array) -> float:
+        turned = angles(np.diag([1.0, -1.0, -1.0]) @ hand(positions)[:3, :3])[kind]
         return float(np.abs(turned[:2]).max()) - 0.3
 
-    return Constraints(orientation_constraints=[turn]), beyond
-
-
-def stays_above(height: float) -> tuple[Constraints, Callable[[Array], float]]:
-    """Return that a point 0.1 m below the flange stays in a box."""
-    place = PositionConstraint(link_name=HAND, weight=1.0)
-    place.header.frame_id = 'panda_link0'
-    place.target_point_offset.z = 0.1
-    place.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[2.0, 2.0, 0.4])
-    ]
-    place.constraint_region.primitive_poses = [pose_at(0.0, 0.0, height + 0.2)]
-
-    def beyond(positions: Array) -> float:
+    def outside(positions: Array) -> float:
         point = hand(positions) @ np.array([0.0, 0.0, 0.1, 1.0])
-        return float(max(abs(point[2] - height - 0.2) - 0.2, np.abs(point[:2]).max() - 1.0))
+        return float((np.abs(point[:3] - [0.0, 0.0, 0.6]) - [1.0, 1.0, 0.2]).max())
 
-    return Constraints(position_constraints=[place]), beyond
-
-
-def keeps_a_joint() -> tuple[Constraints, Callable[[Array], float]]:
-    """Return that a joint stays between two positions, which are not as far on either side."""
-    joint = JointConstraint(
-        joint_name='panda_joint4',
-        position=-2.2,
-        tolerance_above=0.35,
-        tolerance_below=0.2,
-        weight=1.0,
-    )
-
-    def beyond(positions: Array) -> float:
-        return float(max(positions[3] + 1.85, -2.4 - positions[3]))
-
-    return Constraints(joint_constraints=[joint]), beyond
+    return {
+        'euler angles': (
+            Constraints(orientation_constraints=[level]),
+            partial(tilted, OrientationConstraint.XYZ_EULER_ANGLES),
+        ),
+        'rotation vector': (
+            Constraints(orientation_constraints=[vector]),
+            partial(tilted, OrientationConstraint.ROTATION_VECTOR),
+        ),
+        'region': (Constraints(position_constraints=[place]), outside),
+        'joint': (joint, lambda at: float(max(at[3] + 1.85, -2.4 - at[3]))),
+    }
 
 
-CASES = {
-    'euler angles': keeps_level(OrientationConstraint.XYZ_EULER_ANGLES),
-    'rotation vector': keeps_level(OrientationConstraint.ROTATION_VECTOR),
-    'region': stays_above(0.4),
-    'joint': keeps_a_joint(),
-}
+CASES = cases()
 
 
 def request(constraints: Constraints, goal: list[float]) -> MotionPlanRequest:

@@ -15,19 +15,16 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from control_msgs.action import FollowJointTrajectory
-from planning_messages import panda, QuietNode
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros import execution, parameters, scene_monitor
+from arm_planning.ros import execution, parameters
 from arm_planning.ros.execution import TrajectoryExecution
 from arm_planning.ros.parameters import ExecutionLimits, FOLLOW, KINDS
-from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
 from node_runner.action_goals import GoalClient
 
 JOINTS = ('left', 'right')
@@ -36,10 +33,11 @@ JOINTS = ('left', 'right')
 class Controller:
     """An action client of a controller that answers as the test wants."""
 
+    accepted = True
+
     def __init__(self) -> None:
-        self.is_ready, self.cancels = True, 0
+        self.is_ready, self.cancels, self.forgets = True, 0, False
         self.result: Future[Any] = Future()
-        self.forgets = False
         self.goal: Any = None
 
     def server_is_ready(self) -> bool:
@@ -48,11 +46,8 @@ class Controller:
 
     def send_goal_async(self, goal: Any) -> Future[Any]:
         """Accept it."""
-        self.goal = goal
-        self.result = Future()
+        self.goal, self.result = goal, Future()
         return answered(self)
-
-    accepted = True
 
     def get_result_async(self) -> Future[Any]:
         """Return when it ends."""
@@ -86,7 +81,7 @@ ARM = {'arm': parameters.Controller(JOINTS, FOLLOW, FOLLOW.namespace)}
 
 
 class Bench:
-    """An execution with controllers of two joints, which stand at 0."""
+    """An execution with controllers of two joints, which stand at 0; the node of the execution."""
 
     def __init__(
         self, monkeypatch: pytest.MonkeyPatch, known: Mapping[str, parameters.Controller] = ARM
@@ -100,24 +95,14 @@ class Bench:
         self.is_known = True
         match = SimpleNamespace(advance=lambda: self.is_known)
         monkeypatch.setattr(execution, 'ServerMatch', lambda *_: match)
-        self.execution = TrajectoryExecution(
-            self,  # type: ignore[arg-type]
-            known,
-            self.received,
-            ExecutionLimits(),
-            continuous=['left'],
+        node: Any = SimpleNamespace(
+            create_timer=lambda _, callback: setattr(self, 'watch', callback),
+            create_subscription=lambda *_, **__: None,
+            resolve_topic_name=lambda name: f'/{name}',
         )
-
-    def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
-        """Stand in for the node."""
-        self.watch = callback
-
-    def create_subscription(self, *_: object, **__: object) -> None:
-        """Stand in for the node."""
-
-    def resolve_topic_name(self, name: str) -> str:
-        """Stand in for the node."""
-        return f'/{name}'
+        self.execution = TrajectoryExecution(
+            node, known, self.received, ExecutionLimits(), continuous=['left']
+        )
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are."""
@@ -136,6 +121,19 @@ class Bench:
             self.start(trajectory)
         return caught.value
 
+    def expire(self, running: execution.Execution) -> None:
+        """Let the time of an execution be over."""
+        running.deadline = 0.0
+        self.watch()
+
+    def failure(self) -> str:
+        """Return why the only execution has failed; its joints are free."""
+        ((code, reason),) = self.ends
+        assert code is PlanningCode.CONTROL_FAILED
+        self.controller.is_ready = True
+        self.start()
+        return reason
+
 
 @pytest.fixture(name='bench')
 def make_bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
@@ -146,13 +144,10 @@ def make_bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 def motion() -> JointTrajectory:
     """Return a motion of one second."""
     points = [
-        JointTrajectoryPoint(
-            positions=[place, place], velocities=[0.0, 0.0], accelerations=[0.0, 0.0]
-        )
-        for place in (0.0, 0.5, 1.0)
+        JointTrajectoryPoint(positions=[at, at], velocities=[0.0] * 2, accelerations=[0.0] * 2)
+        for at in (0.0, 0.5, 1.0)
     ]
-    points[1].time_from_start.nanosec = 500_000_000
-    points[2].time_from_start.sec = 1
+    points[1].time_from_start.nanosec, points[2].time_from_start.sec = 500_000_000, 1
     return JointTrajectory(joint_names=list(JOINTS), points=points)
 
 
@@ -193,23 +188,21 @@ def test_a_controller_that_does_not_confirm_keeps_its_joints(bench: Bench) -> No
     bench.execution.stop(running)
     bench.watch()
     assert not bench.ends
-    running.deadline = 0.0  # STOP_TIMEOUT is over
-    bench.watch()
-    ((code, reason),) = bench.ends
-    assert code is PlanningCode.CONTROL_FAILED
-    assert 'arm did not confirm' in reason
+    bench.expire(running)  # STOP_TIMEOUT is over
     assert bench.controller.cancels == 2
     assert 'arm did not confirm' in str(bench.refusal())
     bench.controller.end()
-    assert len(bench.ends) == 1
-    bench.start()
+    assert 'arm did not confirm' in bench.failure()
 
 
 @pytest.mark.parametrize('kind', ['GripperCommand', 'ParallelGripperCommand'])
 def test_a_gripper_gets_where_the_trajectory_ends(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """Beside the arm, which follows the rest; one that stalls has not arrived."""
+    """Beside the arm, which follows the rest; one that stalls has not arrived.
+
+    A part of a sequence was planned from where the fingers would meet; arms must be there.
+    """
     hand = parameters.Controller(['right'], KINDS[kind], 'grip')
     arm = parameters.Controller(['left'], FOLLOW, FOLLOW.namespace)
     bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
@@ -226,19 +219,7 @@ def test_a_gripper_gets_where_the_trajectory_ends(
         follower.end(GoalStatus.STATUS_SUCCEEDED)
         gripper.answer(status, KINDS[kind].action.Result(stalled=bool(words)))
         assert bench.ends.pop() == (code, words)
-
-
-def test_a_gripper_that_holds_something_begins_where_it_is(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A part of a sequence was planned from where its fingers would meet; arms must be there."""
-    hand = parameters.Controller(('right',), KINDS['GripperCommand'], 'gripper_cmd')
-    arm = parameters.Controller(('left',), FOLLOW, FOLLOW.namespace)
-    bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
-    bench.turns['right'] = 1
-    bench.start()
-    assert bench.clients['hand/gripper_cmd'].goal.command.position == 1.0
-    bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
+        bench.turns['right'] = 1  # it holds something
     bench.place = 0.1
     assert "at joint 'left'" in str(bench.refusal())
 
@@ -248,14 +229,13 @@ def test_an_execution_whose_watch_raises_ends_with_a_reason(
 ) -> None:
     """Its controller is stopped; a defect that is only logged would leave the client waiting."""
     bench.start()
-    monkeypatch.setattr(bench.controller, 'server_is_ready', lambda: 1 // 0)
-    monkeypatch.setattr(bench.execution, '_is_found', lambda _: True)
-    bench.watch()
+    with monkeypatch.context() as broken:
+        broken.setattr(bench.controller, 'server_is_ready', lambda: 1 // 0)
+        broken.setattr(bench.execution, '_is_found', lambda _: True)
+        bench.watch()
     assert bench.controller.cancels == 1
     bench.controller.end()
-    ((code, reason),) = bench.ends
-    assert code is PlanningCode.CONTROL_FAILED
-    assert 'ZeroDivisionError' in reason
+    assert 'ZeroDivisionError' in bench.failure()
 
 
 @pytest.mark.parametrize('fate', ['forgets', 'is_ready'])
@@ -264,31 +244,22 @@ def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: st
     running = bench.start()
     bench.execution.stop(running)
     setattr(bench.controller, fate, fate == 'forgets')
-    running.deadline = 0.0
-    bench.watch()
-    assert len(bench.ends) == 1
-    bench.controller.is_ready = True
-    bench.start()
+    bench.expire(running)
+    bench.failure()
 
 
+@pytest.mark.parametrize('kind', [FOLLOW, KINDS['ParallelGripperCommand']])
 def test_a_controller_that_is_gone_while_it_moves_ends_the_motion(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, kind: Any
 ) -> None:
     """Also a gripper, whose time is not watched."""
-    hand = parameters.Controller(['left', 'right'], KINDS['ParallelGripperCommand'], 'grip')
-    for known in (ARM, {'hand': hand}):
-        bench = Bench(monkeypatch, known)
-        running = bench.start()
-        bench.watch()
-        bench.controller.is_ready = False
-        bench.watch()
-        running.deadline = 0.0  # STOP_TIMEOUT is over
-        bench.watch()
-        ((code, reason),) = bench.ends
-        assert code is PlanningCode.CONTROL_FAILED
-        assert 'its action is gone' in reason
-        bench.controller.is_ready = True
-        bench.start()
+    bench = Bench(monkeypatch, {'arm': parameters.Controller(JOINTS, kind, 'goals')})
+    running = bench.start()
+    bench.watch()
+    bench.controller.is_ready = False
+    bench.watch()
+    bench.expire(running)  # STOP_TIMEOUT is over
+    assert 'its action is gone' in bench.failure()
 
 
 def test_a_start_is_reported_with_the_way_to_its_first_point(bench: Bench) -> None:
@@ -318,7 +289,17 @@ def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) 
     assert code is (execution.INVALIDATED if change else PlanningCode.CONTROL_FAILED)
     assert change in reason
     assert 'arm: left is in fault' in reason  # a drive may fail in front of an object, too
-    bench.start()
+    # neither a cancel nor the joints wait for it
+    canceled = bench.start()
+    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    bench.execution.stop(canceled, reason='canceled')
+    bench.execution.explain(canceled, 'the scene has changed')
+    assert bench.ends[1:] == [(PlanningCode.PREEMPTED, 'canceled')]
+    bench.ends.clear()
+    running = bench.start()
+    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    bench.expire(running)
+    assert 'did not confirm' not in bench.failure()
 
 
 @pytest.mark.parametrize(
@@ -340,29 +321,6 @@ def test_a_controller_that_says_little_is_put_into_words(
     assert bench.ends == [(PlanningCode.CONTROL_FAILED, reason)]
 
 
-def test_a_cancel_does_not_wait_for_why(bench: Bench) -> None:
-    """It is what the client asked for; what is found out later counts nothing."""
-    bench.execution.on_failure = lambda _: None
-    running = bench.start()
-    bench.controller.end(GoalStatus.STATUS_ABORTED)
-    bench.execution.stop(running, reason='canceled')
-    bench.execution.explain(running, 'the scene has changed')
-    assert bench.ends == [(PlanningCode.PREEMPTED, 'canceled')]
-
-
-def test_why_is_not_waited_for_for_ever(bench: Bench) -> None:
-    """The words of the controller count then, and its joints are free."""
-    bench.execution.on_failure = lambda _: None
-    running = bench.start()
-    bench.controller.end(GoalStatus.STATUS_ABORTED)
-    running.deadline = 0.0
-    bench.watch()
-    ((code, reason),) = bench.ends
-    assert code is PlanningCode.CONTROL_FAILED
-    assert 'did not confirm' not in reason
-    bench.start()
-
-
 @pytest.mark.parametrize(
     ('status', 'outcome'),
     [
@@ -380,28 +338,13 @@ def test_a_scene_that_changes_at_the_end_is_too_late(
     assert [code for code, _ in bench.ends] == [outcome]
 
 
-def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither those that never came, nor those that are older than a second."""
-    now = 100.0
-    monkeypatch.setattr(scene_monitor, 'time', SimpleNamespace(monotonic=lambda: now))
-    monkeypatch.setattr(SceneMonitor, '_publish', lambda _self: None)
-    monitor = SceneMonitor(QuietNode(), panda())  # type: ignore[arg-type]
-    joint = monitor.robot.joints[0]
-    for age, words in ((None, 'not received yet'), (2.0 * STATE_TIMEOUT, '2.0 s old')):
-        if age is not None:
-            monitor._take_joints(JointState(name=[joint], position=[0.5]))
-            assert monitor.received([joint]) == {joint: 0.5}
-            now += age
-        with pytest.raises(PlanningError, match=words) as caught:
-            monitor.received([joint])
-        assert caught.value.code is PlanningCode.ROBOT_STATE_STALE
-        assert 'start state' not in str(caught.value)
-    with pytest.raises(PlanningError, match=f"no joint 'foo'; joints: {joint}"):
-        monitor.received(['foo'])
+def test_a_controller_that_is_not_found_yet_is_waited_for(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor one that does not know its client, which could not cancel; its time counts from then.
 
-
-def test_a_controller_that_is_not_found_yet_is_waited_for(bench: Bench) -> None:
-    """Nor one that does not know its client, which could not cancel; its time counts from then."""
+    One that does not come is named, and gets nothing when it comes later.
+    """
     bench.controller.is_ready, bench.is_known = False, False
     running = bench.start()
     first = running.begin
@@ -414,15 +357,9 @@ def test_a_controller_that_is_not_found_yet_is_waited_for(bench: Bench) -> None:
     assert bench.controller.goal is not None
     assert running.begin > first
     bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
-    assert bench.ends == [(PlanningCode.SUCCESS, '')]
-
-
-def test_a_controller_that_does_not_come_is_named(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Nothing is sent any more when it comes later."""
+    assert bench.ends.pop() == (PlanningCode.SUCCESS, '')
     monkeypatch.setattr(execution, 'FINDING_TIMEOUT', 0.0)
-    bench.controller.is_ready = False
+    bench.controller.is_ready, bench.controller.goal = False, None
     bench.start()
     bench.watch()
     reason = 'no action /arm/follow_joint_trajectory; start the controller arm'
@@ -451,28 +388,23 @@ def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(ben
     bench.start()
     bench.place, bench.controller.is_ready = 0.2, True
     bench.watch()
-    ((code, reason),) = bench.ends
-    assert code is PlanningCode.CONTROL_FAILED
-    assert 'it is at 0.2000, the trajectory begins at 0.0000; plan anew' in reason
     assert bench.controller.goal is None
+    bench.place = 0.0
+    words = 'it is at 0.2000, the trajectory begins at 0.0000; plan anew'
+    assert words in bench.failure()
 
 
-@pytest.mark.parametrize(('joint', 'begins'), [('left', True), ('right', False)])
-def test_whole_turns_of_a_continuous_joint_do_not_count(
-    bench: Bench, joint: str, begins: bool
-) -> None:
+def test_whole_turns_of_a_continuous_joint_do_not_count(bench: Bench) -> None:
     """The way to a first point that comes later is that within the turn, too."""
-    bench.turns = {joint: -2}
     later = motion()
     for number, point in enumerate(later.points, 1):
         point.time_from_start.sec = number
-    if begins:
-        way = bench.start(later).way
-        assert way is not None
-        assert list(way.points[0].positions) == pytest.approx([0.0, 0.0])
-    else:
-        with pytest.raises(PlanningError, match='plan anew'):
-            bench.start(later)
+    bench.turns = {'right': -2}
+    assert 'plan anew' in str(bench.refusal(later))
+    bench.turns = {'left': -2}
+    way = bench.start(later).way
+    assert way is not None
+    assert list(way.points[0].positions) == pytest.approx([0.0, 0.0])
 
 
 def test_an_acceptance_that_comes_twice_counts_once() -> None:

@@ -12,10 +12,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from model_robots import two_arms_texts
+from move_group_rig import joint_goal
 from moveit_msgs.msg import (
     AttachedCollisionObject,
-    Constraints,
-    JointConstraint,
     MotionPlanRequest,
     MotionSequenceItem,
     PositionIKRequest,
@@ -42,14 +41,7 @@ STANDING = {'torso': 0.1, **ARMS}
 def item(group: str, radius: float = 0.0, planner: str = 'PTP', **goal: float) -> Any:
     """Return an item whose goal are joint positions in [rad]."""
     request = MotionPlanRequest(group_name=group, planner_id=planner)
-    request.goal_constraints = [
-        Constraints(
-            joint_constraints=[
-                JointConstraint(joint_name=name, position=position, weight=1.0)
-                for name, position in goal.items()
-            ]
-        )
-    ]
+    request.goal_constraints = [joint_goal(list(goal.values()), list(goal))]
     return MotionSequenceItem(req=request, blend_radius=radius)
 
 
@@ -99,6 +91,7 @@ def test_one_trajectory_for_each_change_of_the_group(thread: PlanningThreads) ->
         assert list(each.points[-1].velocities) == pytest.approx([0.0] * len(each.joint_names))
     places = dict(zip(plan.start.joint_state.name, plan.start.joint_state.position, strict=True))
     assert places == pytest.approx(STANDING)
+    assert planned(thread).trajectories == []  # as in MoveIt, which has no objection
 
 
 def test_each_group_may_have_a_start(thread: PlanningThreads) -> None:
@@ -116,11 +109,6 @@ def test_a_cancel_ends_a_sequence_at_the_next_item(thread: PlanningThreads) -> N
     with pytest.raises(PlanningError, match='item 2: canceled') as caught:
         thread.prepare_sequence(items, is_canceled=lambda: next(looks) == 3)()
     assert caught.value.code is PlanningCode.PREEMPTED
-
-
-def test_no_items_are_no_motion(thread: PlanningThreads) -> None:
-    """As in MoveIt, which has no objection."""
-    assert planned(thread).trajectories == []
 
 
 def test_what_is_refused(thread: PlanningThreads) -> None:
@@ -229,8 +217,7 @@ def test_plans_lead_around_the_other_arm() -> None:
     """Where it is now: also where the straight way is free with all joints beside at 0."""
     draw, planners, in_the_way = np.random.default_rng(2), GroupPlanners(robot()), 0
     for _ in range(MOTIONS):
-        start = anywhere(draw)
-        goal = anywhere(draw)
+        start, goal = anywhere(draw), anywhere(draw)
         model, planner = planners.at('left', start)
         places = [robot().joints.index(name) for name in model.joints]
         scene = scene_for(snapshot(), model.scene)
@@ -243,17 +230,9 @@ def test_plans_lead_around_the_other_arm() -> None:
         for time in np.arange(0.0, plan.path.duration, STEP).tolist():
             there = moved(start, plan.path.at(time).position)
             assert all(depth < SLACK for depth in contacts(there).values())
+        # it is kept while nothing beside its group moves
+        assert planners.at('left', moved(start, ends[1]))[1] is planner
     assert in_the_way
-
-
-def test_a_planner_is_kept_while_nothing_beside_its_group_moves() -> None:
-    """The group itself may move."""
-    planners, rest = GroupPlanners(robot()), robot().positions({})
-    _model, planner = planners.at('left', rest)
-    assert planners.at('left', moved(rest, np.array([0.3, 0.2, 0.1])))[1] is planner
-    model, another = planners.at('left', robot().positions({'torso': 0.4}))
-    assert another is not planner
-    assert model.kinematics.others['torso'] == 0.4
 
 
 def test_inverse_kinematics_has_the_torso_where_it_is() -> None:

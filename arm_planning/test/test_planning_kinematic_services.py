@@ -10,22 +10,20 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import chain_texts, ready, robot, ROBOTS
-from move_group_rig import HAND, JOINTS, MoveGroupRig, READY
+from move_group_rig import HAND, JOINTS, MoveGroupRig, pose_goal, READY
 from moveit_msgs.msg import (
     Constraints,
     JointConstraint,
     MoveItErrorCodes,
-    OrientationConstraint,
-    PositionConstraint,
 )
 import numpy as np
-from planning_messages import box, panda, pose_at
+from planning_messages import box, panda
 import pytest
-from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Array, frozen, ORIGIN, Pose, RobotModel
 from arm_planning import PlanningCode
@@ -68,41 +66,35 @@ def test_way_points_are_passed_in_steps(name: str, side: float, step: float) -> 
 
 @pytest.mark.parametrize('name', ROBOTS)
 def test_the_fraction_ends_where_the_reach_does(name: str) -> None:
-    """Out of reach: all places but the last are met, and the reason is said."""
+    """Out of reach: all places but the last are met, and the reason is said; none is enough."""
     found = cartesian_path(robot(name), ready(name), [tip_at(name, 0.0, 4.0, 0.0)], 0.02)
     assert 0.01 < found.fraction < 0.9
     assert 'no joint positions' in found.reason
     way = tip(name).pose(found.positions[-1]).position - tip_at(name, 0.0, 0.0, 0.0).position
     assert way == pytest.approx([0.0, 4.0 * found.fraction, 0.0], abs=1e-8)
+    still = cartesian_path(robot(name), ready(name), [tip_at(name, 0.0, 0.0, 0.0)], 0.02)
+    assert still.fraction == 1.0
+    assert still.positions == pytest.approx(np.tile(ready(name), (len(still.positions), 1)))
 
 
 def test_jumps_end_a_path() -> None:
     """By the step of a joint that turns or slides, or by the mean step."""
-    name = 'prbt'
-    goal = tip_at(name, 0.0, 0.1, 0.0)
-    free = cartesian_path(robot(name), ready(name), [goal], 0.005)
-    steps = np.abs(np.diff(free.positions, axis=0))
+    model, start, goal = robot('prbt'), ready('prbt'), tip_at('prbt', 0.0, 0.1, 0.0)
+    steps = np.abs(np.diff(cartesian_path(model, start, [goal], 0.005).positions, axis=0))
     limit = float(steps[: len(steps) // 2].max()) * 0.999
-    cut = cartesian_path(
-        robot(name), ready(name), [goal], 0.005, jumps=JumpThresholds(revolute=limit)
-    )
+    cut = cartesian_path(model, start, [goal], 0.005, jumps=JumpThresholds(revolute=limit))
     assert cut.fraction < 0.5
     assert 'would jump by' in cut.reason
     assert np.abs(np.diff(cut.positions, axis=0)).max(initial=0.0) <= limit
-    same = cartesian_path(
-        robot(name), ready(name), [goal], 0.005, jumps=JumpThresholds(2.0, 1.0, 1e-9)
-    )
-    assert same.fraction == 1.0
     lengths = np.linalg.norm(steps, axis=1)
     factor = float(lengths[0] / lengths.mean()) * 0.999
-    none = cartesian_path(robot(name), ready(name), [goal], 0.005, jumps=JumpThresholds(factor))
-    assert none.fraction == 0.0
-
-
-def test_sliding_joints_have_a_threshold_of_their_own() -> None:
-    """A slide that is too far in one step is a jump, though it turns nothing."""
+    for jumps, fraction in (
+        (JumpThresholds(2.0, 1.0, 1e-9), 1.0),  # nothing slides
+        (JumpThresholds(factor), 0.0),
+    ):
+        assert cartesian_path(model, start, [goal], 0.005, jumps=jumps).fraction == fraction
     model = RobotModel(*chain_texts('pzyyzxz'))
-    start = np.array([0.1, 0.3, 0.4, 0.5, 0.3, 0.4, 0.2])
+    start = frozen([0.1, 0.3, 0.4, 0.5, 0.3, 0.4, 0.2])
     pose = LinkKinematics(model).pose(start)
     goal = Pose(pose.rotation, pose.position + np.array([0.05, 0.0, 0.0]))
     assert cartesian_path(model, start, [goal], 0.01).fraction == 1.0
@@ -165,24 +157,19 @@ def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -
 
 def region(y: float) -> Constraints:
     """Return a constraint of the tip to a ball beside where it is."""
-    message = PositionConstraint(link_name=HAND)
-    message.header.frame_id = BASE
-    x, middle, z = TIP.position.tolist()
-    message.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.02])
-    ]
-    message.constraint_region.primitive_poses = [pose_at(x, middle + y, z)]
-    return Constraints(position_constraints=[message])
+    place = pose_goal(pose_message(moved(0.0, y, 0.0)), HAND, BASE).position_constraints[0]
+    place.constraint_region.primitives[0].dimensions = [0.02]
+    return Constraints(position_constraints=[place])
 
 
 def turned(tolerance: float, x: float) -> Constraints:
     """Return a constraint of the tip's orientation."""
-    message = OrientationConstraint(link_name=HAND)
-    message.header.frame_id = HAND
-    message.orientation.x, message.orientation.w = np.sin(0.5 * x), np.cos(0.5 * x)
-    message.absolute_x_axis_tolerance = tolerance
-    message.absolute_y_axis_tolerance = message.absolute_z_axis_tolerance = 0.01
-    return Constraints(orientation_constraints=[message])
+    pose = PoseMessage()
+    pose.orientation.x, pose.orientation.w = np.sin(0.5 * x), np.cos(0.5 * x)
+    turn = pose_goal(pose, HAND, HAND).orientation_constraints[0]
+    turn.absolute_x_axis_tolerance = tolerance
+    turn.absolute_y_axis_tolerance = turn.absolute_z_axis_tolerance = 0.01
+    return Constraints(orientation_constraints=[turn])
 
 
 @pytest.mark.parametrize(
@@ -270,11 +257,7 @@ def test_a_path_ends_in_front_of_what_it_must_not_touch(rig: MoveGroupRig) -> No
     assert 'crate' in blocked.error_code.message
     _, tip = places_of(blocked)
     assert tip[-1][1] == pytest.approx(0.2 * blocked.fraction + TIP.position[1], abs=1e-6)
-
-
-def test_a_path_to_where_the_arm_is_stands_still(rig: MoveGroupRig) -> None:
-    """It is complete, and has one place."""
-    response = path(rig, TIP)
-    assert response.fraction == 1.0
-    _, tip = places_of(response)
-    assert tip == pytest.approx(np.array([TIP.position] * len(tip)), abs=1e-6)
+    rig.add(box('post', *moved(0.15, 0.0, 0.0).position.tolist(), edge=0.06))
+    passed = path(rig, moved(0.3, 0.0, 0.0), avoid_collisions=True, max_step=0.5)
+    assert passed.fraction == 0.0, 'the post is between two places of one step'
+    assert 'post' in passed.error_code.message

@@ -85,7 +85,7 @@ class Bench:
 
         return plan
 
-    def _start(self, _trajectory: Any, done: Done) -> Any:
+    def _start(self, _trajectory: Any, done: Done, *_: Any) -> Any:
         self.executions.append(done)
         return SimpleNamespace(done=done, is_sent=True)
 
@@ -113,6 +113,11 @@ class Bench:
         sent = caller.send_goal_async(goal)  # type: ignore[no-untyped-call]
         self.client.spin_until(sent.done, TIMEOUT, 'acceptance')
         return sent.result()
+
+    def cancel(self, handle: Any) -> None:
+        """Cancel a goal."""
+        answer = handle.cancel_goal_async()
+        self.client.spin_until(answer.done, TIMEOUT, 'answer to the cancel')
 
     def wait_for_execution(self, number: int) -> None:
         """Wait until a plan is executed."""
@@ -149,7 +154,7 @@ def test_a_motion_that_is_not_clear_any_more_is_planned_anew_once(
     for number in range(1, REPLAN_ATTEMPTS):
         bench.executions[-1](INVALIDATED, 'the scene has changed')
         bench.wait_for_execution(number + 1)
-        bench.client.spin_for(0.2)  # ten delays
+        bench.client.spin_for(0.1)  # five delays
         assert bench.plans == number + 1
     bench.executions[-1](PlanningCode.SUCCESS, '')
     status, result = bench.result(handle)
@@ -161,102 +166,94 @@ def test_a_refusal_of_the_second_plan_says_why_the_first_has_ended(bench: Bench)
     handle = bench.move(delay=0.0)
     bench.refusal = PlanningError(PlanningCode.GOAL_IN_COLLISION, 'the goal is covered')
     bench.executions[-1](INVALIDATED, 'a box has come')
-    result = bench.result(handle)[1]
-    assert result.error_code.val == PlanningCode.GOAL_IN_COLLISION
-    assert result.error_code.message == (
-        'the goal is covered; the arm was stopped on its way: a box has come'
-    )
+    code = code_of(bench.result(handle)[1])
+    words = 'the goal is covered; the arm was stopped on its way: a box has come'
+    assert (code.val, code.message) == (PlanningCode.GOAL_IN_COLLISION, words)
 
 
-@pytest.mark.parametrize(
-    ('kind', 'name'),
-    [(MoveGroup, 'move_action'), (MoveGroupSequence, 'sequence_move_group')],
-    ids=['motion', 'sequence'],
-)
-def test_whatever_a_goal_raises_ends_that_goal_only(bench: Bench, kind: Any, name: str) -> None:
+Action = tuple[Any, str]  # type and name
+MOTION: Action = (MoveGroup, 'move_action')
+SEQUENCE: Action = (MoveGroupSequence, 'sequence_move_group')
+TRAJECTORY: Action = (ExecuteTrajectory, 'execute_trajectory')
+
+
+def code_of(result: Any) -> Any:
+    """Return the code of a result of any action."""
+    return getattr(result, 'response', result).error_code
+
+
+@pytest.mark.parametrize('action', [MOTION, SEQUENCE], ids=['motion', 'sequence'])
+def test_whatever_a_goal_raises_ends_that_goal_only(bench: Bench, action: Action) -> None:
     """With the place of the defect; an executor would end the program."""
     bench.refusal = ZeroDivisionError('no such luck')
-    status, result = bench.result(bench.send(kind, name, kind.Goal()))
-    code = getattr(result, 'response', result).error_code
+    status, result = bench.result(bench.send(*action, action[0].Goal()))
+    code = code_of(result)
     assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.CRASH)
     assert 'ZeroDivisionError: no such luck (a defect in _prepare' in code.message
 
 
 def test_a_sequence_is_followed_part_by_part(bench: Bench) -> None:
-    """The next one begins with the end of the one before."""
-    handle = bench.begin(MoveGroupSequence, 'sequence_move_group', MoveGroupSequence.Goal())
-    assert len(bench.executions) == 1
-    bench.executions[0](PlanningCode.SUCCESS, '')
-    bench.wait_for_execution(2)
-    bench.executions[1](PlanningCode.SUCCESS, '')
+    """The next one begins with the end of the one before; it is not planned anew from there."""
+    goal = MoveGroupSequence.Goal()
+    handle = bench.begin(*SEQUENCE, goal)
+    for part in (1, 2):
+        bench.wait_for_execution(part)
+        assert len(bench.executions) == part
+        bench.executions[-1](PlanningCode.SUCCESS, '')
     status, result = bench.result(handle)
-    assert (status, result.response.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1)
+    assert (status, code_of(result).val) == (GoalStatus.STATUS_SUCCEEDED, 1)
     assert len(result.response.planned_trajectories) == 2
+    goal.planning_options.replan = True
+    status, result = bench.result(bench.send(*SEQUENCE, goal))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert 'replan' in code_of(result).message
+    assert bench.plans == 1
 
 
 @pytest.mark.parametrize('stops', [True, False], ids=['stopped', 'arrived'])
 def test_no_part_begins_after_a_cancel(bench: Bench, stops: bool) -> None:
     """Not even where the part before had arrived just then."""
     bench.stops = stops
-    handle = bench.begin(MoveGroupSequence, 'sequence_move_group', MoveGroupSequence.Goal())
-    answer = handle.cancel_goal_async()
-    bench.client.spin_until(answer.done, TIMEOUT, 'answer to the cancel')
+    handle = bench.begin(*SEQUENCE, MoveGroupSequence.Goal())
+    bench.cancel(handle)
     if not stops:
         bench.executions[0](PlanningCode.SUCCESS, '')
     status, result = bench.result(handle)
-    assert (status, result.response.error_code.val) == (
-        GoalStatus.STATUS_CANCELED,
-        PlanningCode.PREEMPTED,
-    )
+    found = status, code_of(result).val
+    assert found == (GoalStatus.STATUS_CANCELED, PlanningCode.PREEMPTED)
     assert len(bench.executions) == 1
 
 
 @pytest.mark.parametrize(
-    ('kind', 'name'),
-    [
-        (MoveGroup, 'move_action'),
-        (MoveGroupSequence, 'sequence_move_group'),
-        (ExecuteTrajectory, 'execute_trajectory'),
-    ],
-    ids=['motion', 'sequence', 'trajectory'],
+    ('action', 'planned'),
+    [(MOTION, False), (SEQUENCE, False), (TRAJECTORY, False), (MOTION, True), (SEQUENCE, True)],
 )
-def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
-    bench: Bench, kind: Any, name: str, monkeypatch: pytest.MonkeyPatch
+def test_a_stop_while_a_goal_is_accepted_or_planned_counts(
+    bench: Bench, action: Action, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The acceptance is delayed for the client."""
+    """Its motion would begin after the stop; the next goal moves the arm again."""
     answer = action_goals._Server._answer_goal
 
     async def stop_before(server: Any, request: Any) -> None:
         bench.execution.stops += 1
         await answer(server, request)
 
-    monkeypatch.setattr(action_goals._Server, '_answer_goal', stop_before)
-    status, result = bench.result(bench.send(kind, name, kind.Goal()))
-    code = getattr(result, 'response', result).error_code
-    assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
-    assert not bench.executions
-
-
-@pytest.mark.parametrize(
-    ('kind', 'name'),
-    [(MoveGroup, 'move_action'), (MoveGroupSequence, 'sequence_move_group')],
-    ids=['motion', 'sequence'],
-)
-def test_what_is_planned_while_everything_is_stopped_is_not_begun(
-    bench: Bench, kind: Any, name: str
-) -> None:
-    """The plan would move the arm after the stop; the next goal does again."""
-    bench.may_plan.clear()
-    handle = bench.send(kind, name, kind.Goal())
-    bench.client.spin_until(lambda: bench.plans == 1, TIMEOUT, 'the plan')
-    bench.execution.stops += 1
-    bench.may_plan.set()
+    with monkeypatch.context() as delayed:
+        if planned:
+            bench.may_plan.clear()
+        else:  # the acceptance is delayed for the client
+            delayed.setattr(action_goals._Server, '_answer_goal', stop_before)
+        handle = bench.send(*action, action[0].Goal())
+    if planned:
+        bench.client.spin_until(lambda: bench.plans == 1, TIMEOUT, 'the plan')
+        bench.execution.stops += 1
+        bench.may_plan.set()
     status, result = bench.result(handle)
-    code = getattr(result, 'response', result).error_code
+    code = code_of(result)
     assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
     assert code.message == 'everything was stopped meanwhile'
     assert not bench.executions
-    bench.begin(kind, name, kind.Goal())
+    bench.begin(*action, action[0].Goal())
 
 
 @pytest.mark.parametrize('plan_only', [False, True])
@@ -265,53 +262,38 @@ def test_a_motion_is_executed_from_where_the_robot_is(bench: Bench, *, plan_only
     goal = MoveGroup.Goal()
     goal.request.start_state.joint_state = JointState(name=['a'], position=[1.0])
     goal.planning_options.plan_only = plan_only
-    bench.send(MoveGroup, 'move_action', goal)
+    bench.moving = 2
+    bench.send(*MOTION, goal)
     bench.client.spin_until(lambda: bool(bench.requests), TIMEOUT, 'the plan')
     start = bench.requests[0].start_state
     assert list(start.joint_state.name) == ['a'] * plan_only
     assert start.is_diff != plan_only
     assert len(bench.warnings) == (not plan_only)
+    assert (bench.moving == 2) == plan_only, 'what only plans does not wait for rest'
 
 
-def test_a_sequence_is_not_planned_anew(bench: Bench) -> None:
-    """From its middle it is another one."""
-    goal = MoveGroupSequence.Goal()
-    goal.planning_options.replan = True
-    status, result = bench.result(bench.send(MoveGroupSequence, 'sequence_move_group', goal))
-    assert status == GoalStatus.STATUS_ABORTED
-    assert 'replan' in result.response.error_code.message
-    assert not bench.plans
-
-
-def test_a_goal_waits_for_joint_states_that_are_about_to_come(bench: Bench) -> None:
-    """A client that comes with the robot is not refused."""
-    bench.stale = 3
-    handle = bench.begin(MoveGroup, 'move_action', MoveGroup.Goal())
-    bench.executions[0](PlanningCode.SUCCESS, '')
-    assert bench.result(handle)[0] == GoalStatus.STATUS_SUCCEEDED
-    assert (bench.plans, bench.stale) == (1, 0)
-
-
-def test_a_goal_is_refused_where_no_joint_states_come(bench: Bench) -> None:
-    """After a second, with the reason."""
-    bench.stale = 1000
-    status, result = bench.result(bench.send(MoveGroup, 'move_action', MoveGroup.Goal()))
-    assert status == GoalStatus.STATUS_ABORTED
-    assert result.error_code.val == PlanningCode.ROBOT_STATE_STALE
-    assert result.error_code.message == 'nobody knows where it is'
-    assert 980 < bench.stale < 1000
-
-
-def test_a_goal_that_waits_for_joint_states_can_be_canceled(bench: Bench) -> None:
-    """It is planned no more."""
-    bench.stale = 1000
-    handle = bench.send(MoveGroup, 'move_action', MoveGroup.Goal())
-    answer = handle.cancel_goal_async()
-    bench.client.spin_until(answer.done, TIMEOUT, 'answer to the cancel')
+@pytest.mark.parametrize('fate', ['they come', 'none comes', 'canceled'])
+def test_a_goal_waits_for_joint_states(bench: Bench, fate: str) -> None:
+    """A client that comes with the robot is not refused; after a second it is, with the reason."""
+    bench.stale = 3 if fate == 'they come' else 1000
+    handle = bench.send(*MOTION, MoveGroup.Goal())
+    if fate == 'they come':
+        bench.wait_for_execution(1)
+        bench.executions[0](PlanningCode.SUCCESS, '')
+    elif fate == 'canceled':
+        bench.cancel(handle)
     status, result = bench.result(handle)
-    assert status == GoalStatus.STATUS_CANCELED
-    assert result.error_code.val == PlanningCode.PREEMPTED
-    assert not bench.plans
+    assert bench.plans == (fate == 'they come')
+    if fate == 'they come':
+        assert (status, bench.stale) == (GoalStatus.STATUS_SUCCEEDED, 0)
+    elif fate == 'canceled':
+        assert status == GoalStatus.STATUS_CANCELED
+        assert result.error_code.val == PlanningCode.PREEMPTED
+    else:
+        assert status == GoalStatus.STATUS_ABORTED
+        assert result.error_code.val == PlanningCode.ROBOT_STATE_STALE
+        assert result.error_code.message == 'nobody knows where it is'
+        assert 980 < bench.stale < 1000
 
 
 def test_a_goal_waits_until_the_arm_has_come_to_rest(bench: Bench) -> None:
@@ -323,12 +305,3 @@ def test_a_goal_waits_until_the_arm_has_come_to_rest(bench: Bench) -> None:
         assert bench.moving in {-1, 1000 - 10}
         bench.executions.pop()(PlanningCode.SUCCESS, '')
         assert bench.result(handle)[0] == GoalStatus.STATUS_SUCCEEDED
-
-
-def test_what_only_plans_does_not_wait_for_rest(bench: Bench) -> None:
-    """It begins where the arm is."""
-    bench.moving = 1000
-    goal = MoveGroup.Goal()
-    goal.planning_options.plan_only = True
-    bench.result(bench.send(MoveGroup, 'move_action', goal))
-    assert (bench.plans, bench.moving) == (1, 1000)

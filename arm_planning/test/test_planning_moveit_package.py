@@ -56,39 +56,30 @@ def settings_of(folder: Path) -> Any:
     return read_settings(package.parameters, package.places)
 
 
-def test_a_package_of_the_assistant_is_read_whole(tmp_path: Path) -> None:
-    """Robot, limits and planners."""
-    settings = settings_of(moveit_package('panda', tmp_path))
-    assert settings.joint_limits['panda_joint2']['max_velocity'] == 2.175
-    assert settings.cartesian_limits['max_trans_vel'] == 0.5
-    assert (settings.velocity_scaling, settings.acceleration_scaling) == (0.1, 0.1)
-    assert settings.ik_timeouts == {'panda_arm': 0.25}
-    planners = settings.planners
-    assert planners.name('', 'panda_arm') == 'RRTstarkConfigDefault'
-    assert planners.search('RRTstarkConfigDefault') == 'geometric::RRTstar'
-    assert planners.ids[:2] == ['panda_arm', 'panda_arm[RRTConnectkConfigDefault]']
-    assert planners.configs['TRRTkConfigDefault']['min_temperature'] == pytest.approx(1e-9)
-
-
-def test_files_of_former_versions_are_read(tmp_path: Path) -> None:
-    """Names in capitals, a URDF elsewhere, controllers by the robot's name, no planner_configs."""
-    package = read_package(moveit_package('prbt', tmp_path))
-    assert '<robot name="prbt"' in str(package.parameters['robot_description'])
-    assert package.parameters['moveit_simple_controller_manager.controller_names'] == [
-        'prbt_joint_trajectory_controller'
-    ]
-    settings = read_settings(package.parameters, package.places)
-    assert settings.joint_limits is None
-    assert settings.planners.search('SBLkConfigDefault') == 'geometric::SBL'
-
-
-def test_limits_may_stand_in_the_table_of_their_parameter(tmp_path: Path) -> None:
-    """As some packages have them."""
+def test_packages_of_the_assistant_are_read(tmp_path: Path) -> None:
+    """Limits in a table of their own or without one; files of former versions."""
     folder = moveit_package('panda', tmp_path)
     path = folder / 'config' / 'joint_limits.yaml'
     lines = path.read_text().splitlines()
-    path.write_text('robot_description_planning:\n' + '\n'.join(f'  {each}' for each in lines))
-    assert settings_of(folder).joint_limits['panda_joint2']['max_velocity'] == 2.175
+    for text in ('\n'.join(lines), 'robot_description_planning:\n  ' + '\n  '.join(lines)):
+        path.write_text(text)
+        settings = settings_of(folder)
+        assert settings.joint_limits['panda_joint2']['max_velocity'] == 2.175
+        assert settings.ik_timeouts == {'panda_arm': 0.25}
+        assert settings.planners.configs['TRRTkConfigDefault']['min_temperature'] == 1e-9
+    # names in capitals, a URDF elsewhere, controllers by the robot's name, no planner_configs
+    folder = moveit_package('prbt', tmp_path)
+    package = read_package(folder)
+    assert '<robot name="prbt"' in str(package.parameters['robot_description'])
+    names = package.parameters['moveit_simple_controller_manager.controller_names']
+    assert names == ['prbt_joint_trajectory_controller']
+    settings = settings_of(folder)
+    assert settings.joint_limits is None
+    assert settings.planners.search('SBLkConfigDefault') == 'geometric::SBL'
+    path = folder / '.setup_assistant'
+    path.write_text(path.read_text().replace('package: arm_bringup', 'package: nobodys_arm'))
+    with pytest.raises(ConfigError, match='nobodys_arm is not installed'):
+        read_package(folder)
 
 
 LIMITS, OMPL, CONTROLLERS = 'joint_limits.yaml', 'ompl_planning.yaml', 'moveit_controllers.yaml'
@@ -104,12 +95,7 @@ BROKEN = [
     ('kinematics.yaml', 'timeout: 0.25', 'timeout: -1', 'a number of 0 or more'),
     (CARTESIAN, '-5.0', '5.0', 'must be a negative number'),
     (CARTESIAN, 'max_rot_vel', 'max_rot_speed', "no 'max_rot_speed'"),
-    (
-        OMPL,
-        'panda_arm:\n  planner_configs:',
-        'panda_arm:\n  planner_configs: [TRRT]\n  x:',
-        "'TRRT'",
-    ),
+    (OMPL, 'arm:\n  planner_configs:', 'arm:\n  planner_configs: [TRRT]\n  x:', "'TRRT'"),
     (OMPL, 'config: RRTstarkConfigDefault', 'config: RRT', "names 'RRT', which .*; it has RRTs"),
     (PILZ, 'config: PTP', 'config: SPLINE', 'must be PTP, LIN or CIRC'),
     (CONTROLLERS, 'default: true', 'default: maybe', 'true or false'),
@@ -153,15 +139,6 @@ def test_what_is_missing_is_named(tmp_path: Path, remove: str, words: str) -> No
         settings_of(folder)
 
 
-def test_a_urdf_of_a_package_that_is_not_installed_is_named(tmp_path: Path) -> None:
-    """As after a git clone of the configuration alone."""
-    folder = moveit_package('prbt', tmp_path)
-    path = folder / '.setup_assistant'
-    path.write_text(path.read_text().replace('package: arm_bringup', 'package: nobodys_arm'))
-    with pytest.raises(ConfigError, match='nobodys_arm is not installed'):
-        read_package(folder)
-
-
 @pytest.fixture(name='panda', scope='module')
 def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
     """Start move_group with the Panda's package."""
@@ -182,52 +159,34 @@ def duration(response: Any) -> float:
 
 def test_planners_of_the_package_plan(panda: MoveGroupRig) -> None:
     """By all names that clients have for them; those that are not here have another search."""
-    for planner_id in (
-        '',
-        'panda_arm',
-        'RRTConnectkConfigDefault',
-        'panda_arm[TRRTkConfigDefault]',
-    ):
-        answer = panda.plan(motion_request(joint_goal(MOVED), planner_id=planner_id))
-        assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
-    answer = panda.plan(motion_request(joint_goal(MOVED), planner_id='Dijkstra'))
-    assert answer.error_code.val != MoveItErrorCodes.SUCCESS
-    assert re.search(
-        "'Dijkstra'; choose one of RRT.*, TRRTkConfigDefault, PTP", answer.error_code.message
-    )
-
-
-def test_planners_of_the_package_are_listed_as_moveit_lists_them(panda: MoveGroupRig) -> None:
-    """RViz takes the names of a group out of the brackets."""
-    interfaces = panda.client.call(
-        QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
-    ).planner_interfaces
-    assert 'panda_arm[RRTstarkConfigDefault]' in interfaces[0].planner_ids
+    goal = joint_goal(MOVED)
+    for name in ('', 'panda_arm', 'RRTConnectkConfigDefault', 'panda_arm[TRRTkConfigDefault]'):
+        assert duration(panda.plan(motion_request(goal, planner_id=name)))
+    code = panda.plan(motion_request(goal, planner_id='Dijkstra')).error_code
+    assert code.val != MoveItErrorCodes.SUCCESS
+    assert re.search("'Dijkstra'; choose one of RRT.*, TRRTkConfigDefault, PTP", code.message)
+    # RViz takes the names of a group out of the brackets
+    asked: Any = QueryPlannerInterfaces.Request()
+    listed = panda.client.call(QueryPlannerInterfaces, '/query_planner_interface', asked)
+    names = listed.planner_interfaces[0].planner_ids
+    assert names[:2] == ['panda_arm', 'panda_arm[RRTConnectkConfigDefault]']
+    assert 'panda_arm[RRTstarkConfigDefault]' in names
     asked = GetPlannerParams.Request(planner_config='RRTstarkConfigDefault', group='panda_arm')
     params = panda.client.call(GetPlannerParams, '/get_planner_params', asked).params
     assert dict(zip(params.keys, params.values, strict=True)) == {
-        'type': 'geometric::RRTstar',
-        'range': '0.0',
-        'goal_bias': '0.05',
+        'type': 'geometric::RRTstar', 'range': '0.0', 'goal_bias': '0.05',
         'delay_collision_checking': '1',
-    }
+    }  # fmt: skip
 
 
 def test_the_packages_factors_count_where_a_request_has_none(panda: MoveGroupRig) -> None:
     """A tenth of velocity and acceleration, as beginners get it."""
-    beginners = duration(panda.plan(motion_request(joint_goal(MOVED))))
-    tenth, whole = (
-        duration(
-            panda.plan(
-                motion_request(
-                    joint_goal(MOVED),
-                    max_velocity_scaling_factor=factor,
-                    max_acceleration_scaling_factor=factor,
-                )
-            )
-        )
-        for factor in (0.1, 1.0)
-    )
+    request = motion_request(joint_goal(MOVED))
+    lasts = []
+    for factor in (0.0, 0.1, 1.0):
+        request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = factor
+        lasts.append(duration(panda.plan(request)))
+    beginners, tenth, whole = lasts
     assert beginners == pytest.approx(tenth, rel=1e-6)
     assert beginners > 2.0 * whole
 
@@ -250,16 +209,13 @@ def test_cartesian_limits_of_the_package_bound_a_line(panda: MoveGroupRig) -> No
 def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
     """A GripperCommand with the joint that follows the other one in its list."""
     server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1')
-    goal = joint_goal([0.03], ['panda_finger_joint1'])
-    _status, result = panda.move(action_goal(motion_request(goal, 'hand')))
-    assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
-    assert panda.followed[-1].command.position == pytest.approx(0.03)
     # MoveGroupInterface names joints that follow others, too
-    panda.settle()
-    both = joint_goal([0.01, 0.01], FINGERS)
-    _status, result = panda.move(action_goal(motion_request(both, 'hand')))
-    assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
-    assert panda.followed[-1].command.position == pytest.approx(0.01)
+    for place, joints in ((0.03, FINGERS[:1]), (0.01, FINGERS)):
+        goal = joint_goal([place] * len(joints), joints)
+        _status, result = panda.move(action_goal(motion_request(goal, 'hand')))
+        assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
+        assert panda.followed[-1].command.position == pytest.approx(place)
+        panda.settle()
     trajectory = result.planned_trajectory.joint_trajectory
     trajectory.joint_names = FINGERS
     back = [[*point.positions] * 2 for point in reversed(trajectory.points)]
@@ -267,7 +223,6 @@ def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
         point.positions, point.velocities, point.accelerations = positions, [], []
     execute = ExecuteTrajectory.Goal(trajectory=result.planned_trajectory)
     panda.followed.clear()
-    panda.settle()
     _status, result = panda.run(ExecuteTrajectory, 'execute_trajectory', execute)
     assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
     assert panda.followed[-1].command.position == pytest.approx(0.03)
@@ -284,7 +239,8 @@ def held(rig: MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
     The controller keeps it until the test has it go on.
     """
     rig.held.clear()
-    request = motion_request(goal, group)
+    request = motion_request(goal, group, max_velocity_scaling_factor=1.0)
+    request.max_acceleration_scaling_factor = 1.0
     allowed = 1.2 * duration(rig.plan(request)) + 0.5  # moveit_controllers.yaml
     handle = rig.send(MoveGroup, '/move_action', action_goal(request))
     result = handle.get_result_async()
@@ -293,90 +249,83 @@ def held(rig: MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
     return result, allowed
 
 
+def outcome(rig: MoveGroupRig, result: Any) -> int:
+    """Let the controller that holds end; return the code of the result."""
+    rig.held[0].execute()
+    rig.client.spin_until(result.done, 60.0, 'result')
+    return int(result.result().result.error_code.val)
+
+
 def test_a_gripper_takes_the_time_that_it_needs(panda: MoveGroupRig) -> None:
     """It closes until it stalls, and a cancel would end its grip."""
     server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1', holds=True)
     result, allowed = held(panda, joint_goal([0.02], ['panda_finger_joint1']), 'hand')
     panda.client.spin_for(allowed + 1.0)
     assert not panda.held[0].is_cancel_requested
-    panda.held[0].execute()
-    panda.client.spin_until(result.done, 60.0, 'result')
-    assert result.result().result.error_code.val == MoveItErrorCodes.SUCCESS
+    assert outcome(panda, result) == MoveItErrorCodes.SUCCESS
     server.destroy()
 
 
-def test_a_speed_override_gives_an_execution_more_time(panda: MoveGroupRig) -> None:
-    """Paused it waits; at full speed, a controller that does not go on is too slow.
+def test_the_state_of_a_controller_says_how_long_it_may_take(panda: MoveGroupRig) -> None:
+    """Paused, or held up and going on, it is waited for; at full speed it is too slow.
 
     So is one that leaves the factor at 0, as many releases of joint_trajectory_controller do.
     """
     server = panda.serve_arm('panda_arm_controller', holds=True)
     topic = '/panda_arm_controller/controller_state'
-    states = panda.client.node.create_publisher(JointTrajectoryControllerState, topic, 10)
-    state = JointTrajectoryControllerState(speed_scaling_factor=0.0)
-    timer = panda.client.node.create_timer(0.02, lambda: states.publish(state))
-    panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
-    for is_filled in (False, True):
-        if is_filled:
-            state.speed_scaling_factor = 1.0
-            panda.client.spin_for(0.5)
-            state.speed_scaling_factor = 0.0
-        result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
-        if is_filled:
-            panda.client.spin_for(allowed + 1.0)
-            assert not panda.held[0].is_cancel_requested
-            state.speed_scaling_factor = 1.0
-        panda.client.spin_until(lambda: panda.held[0].is_cancel_requested, 60.0, 'cancel')
-        panda.held[0].execute()
-        panda.client.spin_until(result.done, 60.0, 'result')
-        assert result.result().result.error_code.val == MoveItErrorCodes.TIMED_OUT
-    panda.client.node.destroy_timer(timer)
-    server.destroy()
-
-
-def test_a_controller_that_was_held_up_and_goes_on_is_waited_for(panda: MoveGroupRig) -> None:
-    """Its cycles stood still on a busy computer; the end comes later, and is a success."""
-    server = panda.serve_arm('panda_arm_controller', holds=True)
-    topic = '/panda_arm_controller/controller_state'
-    states = panda.client.node.create_publisher(JointTrajectoryControllerState, topic, 10)
-    state = JointTrajectoryControllerState()
+    node, slow = panda.client.node, MoveItErrorCodes.TIMED_OUT
+    states = node.create_publisher(JointTrajectoryControllerState, topic, 10)
+    state, step = JointTrajectoryControllerState(speed_scaling_factor=0.0), 0.0
     state.reference.positions = [0.0]
 
     def publish() -> None:
-        state.reference.positions[0] += 1e-4
+        state.reference.positions[0] += step
         states.publish(state)
 
-    timer = panda.client.node.create_timer(0.02, publish)
+    timer = node.create_timer(0.02, publish)
     panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
-    result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+
+    def begun() -> tuple[Any, float]:
+        return held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+
+    def is_canceled() -> bool:
+        return bool(panda.held[0].is_cancel_requested)
+
+    result, _ = begun()
+    panda.client.spin_until(is_canceled, 60.0, 'cancel where the factor was never filled')
+    assert outcome(panda, result) == slow
+    result, allowed = begun()
+    step = 1e-4  # a busy computer held it up, and it goes on
     panda.client.spin_for(allowed + 1.0)
-    assert not panda.held[0].is_cancel_requested
-    panda.held[0].execute()
-    panda.client.spin_until(result.done, 60.0, 'result')
-    assert result.result().result.error_code.val == MoveItErrorCodes.SUCCESS
-    panda.client.node.destroy_timer(timer)
+    assert not is_canceled()
+    assert outcome(panda, result) == MoveItErrorCodes.SUCCESS
+    step, state.speed_scaling_factor = 0.0, 1.0
+    panda.client.spin_for(0.5)
+    state.speed_scaling_factor = 0.0
+    panda.reset()
+    result, allowed = begun()
+    panda.client.spin_for(allowed + 1.0)
+    assert not is_canceled(), 'paused'
+    state.speed_scaling_factor = 1.0
+    panda.client.spin_until(is_canceled, 60.0, 'cancel at full speed')
+    assert outcome(panda, result) == slow
+    node.destroy_timer(timer)
     server.destroy()
 
 
 def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGroupRig) -> None:
     """A goal behind a wall, for which a minute is allowed."""
     wall = box('wall', 0.0, 0.0, 0.0)
-    wall.primitives = [
-        SolidPrimitive(type=SolidPrimitive.BOX, dimensions=size)
-        for size in ([1.1, 0.02, 1.0], [1.1, 0.02, 1.0], [2.5, 2.5, 0.02])
-    ]
-    wall.primitive_poses = [
-        pose_at(0.69, 0.0, 0.5),
-        pose_at(-0.7, 0.0, 0.5),
-        pose_at(0.0, 0.0, 0.8),
-    ]
-    panda.positions |= dict(zip(JOINTS, [1.2, *READY[1:]], strict=True))
+    sizes = [1.1, 0.02, 1.0], [1.1, 0.02, 1.0], [2.5, 2.5, 0.02]
+    wall.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=each) for each in sizes]
+    places = (0.69, 0.0, 0.5), (-0.7, 0.0, 0.5), (0.0, 0.0, 0.8)
+    wall.primitive_poses = [pose_at(*each) for each in places]
+    panda.positions[JOINTS[0]] = 1.2
     panda.settle()
     panda.add(wall)
     request = motion_request(joint_goal([-1.2, *READY[1:]]))
     request.allowed_planning_time = 60.0
-    goal = action_goal(request, plan_only=True)
-    handle = panda.send(MoveGroup, '/move_action', goal)
+    handle = panda.send(MoveGroup, '/move_action', action_goal(request, plan_only=True))
     result = handle.get_result_async()
     hand = motion_request(joint_goal([0.02], ['panda_finger_joint1']), 'hand')
     asked = GetMotionPlan.Request(motion_plan_request=hand)
@@ -401,60 +350,43 @@ def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:
     assert not any('cartesian' in name or 'kinect_pointcloud' in name for name in names)
 
 
-@pytest.mark.parametrize(
-    ('name', 'right', 'wrong'),
-    [
-        ('moveit_controllers', 'joints', 'jionts'),
-        ('moveit_controllers', 'allowed_start_tolerance', 'allowed_start_tolerence'),
-        ('kinematics', 'kinematics_solver_timeout', 'kinematics_solver_timout'),
-        ('ompl_planning', 'default_planner_config', 'default_planer_config'),
-    ],
-)
-def test_keys_that_are_misspelt_are_named(
-    tmp_path: Path, name: str, right: str, wrong: str
-) -> None:
-    """Where others are passed over; with file and line."""
-    folder = moveit_package('panda', tmp_path)
-    assert not misspelt([*read_package(folder).parameters], {})
-    path = folder / 'config' / f'{name}.yaml'
-    path.write_text(path.read_text().replace(f'{right}:', f'{wrong}:', 1))
-    package = read_package(folder)
-    (line,) = misspelt([*package.parameters], package.places)
-    assert re.search(rf"{name}\.yaml:\d+: .*{wrong}: .*did you mean '{right}'", line), line
+CONTROLLER, JOINT = '  panda_arm_contoller: {type: x}\n', '  panda_joint8: {max_velocity: 1.0}\n'
+GROUP = 'panda_amr: {kinematics_solver_timeout: 0.1}\n'
+PROJECTION = 'panda_amr: {projection_evaluator: joints(a)}\n'
+NO = 'without effect, there is no'
 
 
 @pytest.mark.parametrize(
-    ('name', 'above', 'text', 'kind'),
+    ('name', 'old', 'new', 'words'),
     [
-        (
-            'moveit_controllers',
-            f'{MANAGER}:\n',
-            '  panda_arm_contoller: {type: x}\n',
-            'controller',
-        ),
-        (
-            'joint_limits',
-            'joint_limits:\n',
-            '  panda_joint8: {max_velocity: 1.0}\n',
-            'movable joint',
-        ),
-        ('kinematics', '', 'panda_amr: {kinematics_solver_timeout: 0.1}\n', 'group'),
-        ('ompl_planning', '', 'panda_amr: {projection_evaluator: joints(a)}\n', 'group'),
+        ('moveit_controllers', 'joints:', 'jionts:', "jionts: .*did you mean 'joints'"),
+        ('moveit_controllers', 'start_tolerance:', 'start_tolerence:', "mean 'allowed_start_tol"),
+        ('kinematics', 'solver_timeout:', 'solver_timout:', "mean 'kinematics_solver_timeout'"),
+        ('ompl_planning', 'default_planner_', 'default_planer_', "mean 'default_planner_config'"),
+        ('moveit_controllers', f'{MANAGER}:\n', CONTROLLER, f'{NO} controller '),
+        ('joint_limits', 'joint_limits:\n', JOINT, f'{NO} movable joint '),
+        ('kinematics', '', GROUP, f'{NO} group '),
+        ('ompl_planning', '', PROJECTION, f'{NO} group '),
     ],
-)
-def test_tables_of_what_the_robot_lacks_are_named(
-    tmp_path: Path, name: str, above: str, text: str, kind: str
+)  # fmt: skip
+def test_keys_without_effect_are_named(
+    tmp_path: Path, name: str, old: str, new: str, words: str
 ) -> None:
-    """With file and line, and what there is."""
+    """With file and line; of tables of what the robot lacks with what there is."""
     folder = moveit_package('panda', tmp_path)
-    path = folder / 'config' / f'{name}.yaml'
     robot = ['panda_arm', 'hand'], [*JOINTS, *FINGERS], MOVERS
-    nested = 'robot_description_kinematics.panda_arm.bio_ik.threads'
-    assert not of_nothing([*read_package(folder).parameters, nested], {}, *robot)
-    path.write_text(path.read_text().replace(above, above + text, 1))
-    package = read_package(folder)
-    (line,) = of_nothing([*package.parameters], package.places, *robot)
-    assert re.search(rf'{name}\.yaml:\d+: .*: without effect, there is no {kind} ', line), line
+    path = folder / 'config' / f'{name}.yaml'
+
+    def found(*others: str) -> list[str]:
+        package = read_package(folder)
+        keys = [*package.parameters, *others]
+        return [*misspelt(keys, package.places), *of_nothing(keys, package.places, *robot)]
+
+    assert not found('robot_description_kinematics.panda_arm.bio_ik.threads')
+    new = new if old[-1:] in {':', '_'} else old + new
+    path.write_text(path.read_text().replace(old, new, 1))
+    (line,) = found()
+    assert re.search(rf'{name}\.yaml:\d+: .*{words}', line), line
 
 
 def test_the_prbts_package_starts(isolation: Isolation, tmp_path: Path) -> None:
@@ -475,12 +407,9 @@ def test_parameters_of_moveits_launch_files_do_the_same(
     isolation: Isolation, tmp_path: Path
 ) -> None:
     """The same names, flattened, without --moveit-config; execution can be forbidden."""
-    package = read_package(moveit_package('panda', tmp_path))
-    values = {
-        name: value
-        for name, value in package.parameters.items()
-        if not name.startswith('kinect') and name != 'sensors'
-    }
+    values = dict(read_package(moveit_package('panda', tmp_path)).parameters)
+    for name in [each for each in values if each.startswith('kinect') or each == 'sensors']:
+        del values[name]
     values |= {'publish_planning_scene': True, 'capabilities': '', 'monitor_dynamics': False}
     values['allow_trajectory_execution'] = False
     path = tmp_path / 'launch_params.json'
@@ -521,13 +450,9 @@ def test_what_does_not_fit_the_robot_is_refused(isolation: Isolation, tmp_path: 
     with RunningProcess(command, isolation.env) as process:
         assert process.wait(60.0) == 1, process.output
         process.wait_for(rf'{LIMITS}:\d+: .*panda_joint1.*21.75 is wider')
-
-
-def test_a_limits_file_that_lacks_a_joint_is_refused(tmp_path: Path) -> None:
-    """With its path, where the parameter joint_limits names it."""
-    limits = tmp_path / 'limits.yaml'
+    limits = tmp_path / 'limits.yaml'  # of the parameter joint_limits
     limits.write_text('joint_limits: {elbow: {}}')
-    path = panda_parameters(tmp_path, joint_limits=str(limits))
+    path = panda_parameters(tmp_path, joint_limits=limits)
     text = refusal(None, '--ros-args', '--params-file', str(path))
     words = rf'joint panda_joint1 is missing .*\(joint_limits: {re.escape(str(limits))}\)'
     assert re.search(words, text), text

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 import os
 
 from model_robots import ready, robot, ROBOTS
@@ -21,7 +22,18 @@ from planning_scenes import (
 )
 import pytest
 
-from arm_model import Array, Box, Cylinder, frozen, ORIGIN, PlacedShape, Pose, RobotModel, Sphere
+from arm_model import (
+    Array,
+    Box,
+    Cylinder,
+    frozen,
+    inverse,
+    ORIGIN,
+    PlacedShape,
+    Pose,
+    RobotModel,
+    Sphere,
+)
 from arm_planning import (
     JointGoal,
     MotionRequest,
@@ -49,18 +61,16 @@ APART, AROUND = 1.0, 0.9
 """How far start and goal are apart at least, and from the ready pose at most, in [rad]."""
 
 
-def level(model: RobotModel) -> PathConstraints:
-    """Keep a cup level: turned about its axis only, which is that of the tool at ready."""
+def level(model: RobotModel, behind: float = 0.0) -> PathConstraints:
+    """Keep a cup level: turned about its axis only, which is that of the tool at ready.
+
+    Args:
+        behind: How far about that axis it begins away, in [rad].
+    """
     upright = model.pose(ready(model.name)).rotation
-    turn = OrientationConstraint(model.tip, upright, frozen([0.1, 0.1, FREE_TURN]))
+    wanted = frozen(upright @ pin.exp3(np.array([0.0, 0.0, behind])))
+    turn = OrientationConstraint(model.tip, wanted, frozen([0.1, 0.1, FREE_TURN]))
     return PathConstraints(orientations=[turn])
-
-
-def level_from_behind(model: RobotModel) -> PathConstraints:
-    """Keep a cup level that begins nearly half a turn about its axis away."""
-    (turn,) = level(model).orientations
-    wanted = frozen(turn.rotation @ pin.exp3(np.array([0.0, 0.0, 2.9])))
-    return PathConstraints(orientations=[replace(turn, rotation=wanted)])
 
 
 def in_a_slab(model: RobotModel) -> PathConstraints:
@@ -96,15 +106,10 @@ def broken(model: RobotModel, constraints: PathConstraints, state: Array) -> lis
             found.append(f'turned by {off}')
     for place in constraints.positions:
         point = pose.position + pose.rotation @ place.offset
-        if not any(_in_region(region, point) for region in place.regions):
+        local = [(each.shape, inverse(each.pose)) for each in place.regions]
+        if not any(holds(s, p.position + p.rotation @ point, EDGE) for s, p in local):  # type: ignore[arg-type]
             found.append(f'{point} is in no region')
     return found
-
-
-def _in_region(region: PlacedShape, point: Array) -> bool:
-    if not isinstance(region.shape, (Box, Cylinder)):
-        raise TypeError(region.shape)
-    return holds(region.shape, region.pose.rotation.T @ (point - region.pose.position), EDGE)
 
 
 def ends(
@@ -124,7 +129,9 @@ def ends(
 
 
 @pytest.mark.parametrize('name', ROBOTS)
-@pytest.mark.parametrize('constraints_of', [level, level_from_behind, in_a_slab, by_joints])
+@pytest.mark.parametrize(
+    'constraints_of', [level, partial(level, behind=2.9), in_a_slab, by_joints]
+)
 @pytest.mark.parametrize('seed', SEEDS)
 def test_path_constraints_hold_everywhere(
     name: str, constraints_of: Callable[[RobotModel], PathConstraints], seed: int
@@ -142,30 +149,9 @@ def test_path_constraints_hold_everywhere(
     assert broken_limits(path, model.limits) == []
     assert np.allclose(path.at(0.0).position, start, atol=1e-9)
     assert np.allclose(path.end.position, goal, atol=1e-6)
-
-
-def test_it_is_the_constraint_that_keeps_the_cup_level() -> None:
-    """Without it the same motion tilts the tool by more than is allowed."""
-    model = robot('panda')
-    constraints = level(model)
-    check, planner = ConstraintCheck(model, constraints), Planner(model)
-    start, goal = ends(model, check, planner, seed=1)
-    path = planner.plan(MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT)).path
-    assert check.path(path) is not None
-
-
-def test_under_constraints_the_first_path_counts() -> None:
-    """Further attempts would take as long each, until the time is over."""
-    model = robot('panda')
-    constraints = level(model)
-    start, goal = ends(model, ConstraintCheck(model, constraints), Planner(model), seed=0)
-    asked = MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT, constraints=constraints)
-    scene = with_random_boxes(model, 5, 0)
-    first, second = (
-        Planner(model).plan(replace(asked, attempts=count), scene).path.duration
-        for count in (1, 5)
-    )
-    assert first == second
+    if (name, constraints_of) == ('panda', level):  # the first path counts, however many attempts
+        again = Planner(model, seed=seed).plan(replace(asked, attempts=5), scene).path
+        assert again.duration == path.duration
 
 
 def test_a_pose_is_reached_by_a_solution_that_heeds_the_constraints() -> None:
@@ -188,25 +174,19 @@ def test_a_goal_that_breaks_a_constraint_is_reached_where_its_tolerance_heeds_it
     model, start = robot('gp110'), ready('gp110')
     least = float(start[0]) - 0.3
     constraints = PathConstraints({model.joints[0]: (least, least + 2.0)})
-    places = start.copy()
-    places[0] -= 0.4
-    goal: JointGoal | PoseGoal = JointGoal(frozen(places), frozen([0.3] * 6))
-    exact: JointGoal | PoseGoal = JointGoal(frozen(places))
+    places = frozen(start - 0.4 * np.eye(6)[0])
+    goal: JointGoal | PoseGoal = JointGoal(places, frozen([0.3] * 6))
+    exact: JointGoal | PoseGoal = JointGoal(places)
     if by_pose:
-        exact = PoseGoal(model.pose(frozen(places)))
+        exact = PoseGoal(model.pose(places))
         goal = replace(exact, tolerances=near(exact.pose, Sphere(1.0), frozen([0.5] * 3)))
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
-    end = path.end.position
     assert path.positions(dense_times(path))[:, 0].min() >= least - 1e-9
-    if by_pose:
-        at = model.pose(end)
-        wanted = model.pose(frozen(places))
-        assert np.linalg.norm(at.position - wanted.position) <= 1.0 + 1e-6
-        turned = pin.log3(wanted.rotation.T @ at.rotation)
-        assert np.abs(turned).max() <= 0.5 + 1e-6
+    if isinstance(goal, PoseGoal) and goal.tolerances is not None:
+        assert broken(model, goal.tolerances, path.end.position) == []
     else:
-        assert np.abs(end - places).max() <= 0.3 + 1e-6
+        assert np.abs(path.end.position - places).max() <= 0.3 + 1e-6
     with pytest.raises(PlanningError, match='goal: ') as refused:
         Planner(model).plan(replace(asked, goals=[exact]))
     assert refused.value.code is PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS
@@ -216,49 +196,35 @@ def test_a_tilted_goal_is_reached_upright_where_its_tolerance_is_wide() -> None:
     """What is narrow in a wide tolerance is found by projection, not by chance."""
     model, start = robot('panda'), ready('panda')
     (turn,) = level(model).orientations
-    constraints = PathConstraints(
-        orientations=[replace(turn, tolerance=frozen([0.02, 0.02, FREE_TURN]))]
-    )
+    narrow = replace(turn, tolerance=frozen([0.02, 0.02, FREE_TURN]))
+    constraints = PathConstraints(orientations=[narrow])
     pose = model.pose(start)
     tilted = pose.rotation @ pin.exp3(np.array([0.2, 0.0, 0.0]))
     aside = Pose(frozen(tilted), frozen(np.add(pose.position, [0.0, 0.2, 0.0])))
-    goal = PoseGoal(aside, tolerances=near(aside, Sphere(0.01), frozen([0.4] * 3)))
+    tolerances = near(aside, Sphere(0.01), frozen([0.4] * 3))
+    goal = PoseGoal(aside, tolerances=tolerances)
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
     looks = path.positions(dense_times(path))
     assert [words for state in looks for words in broken(model, constraints, state)] == []
-    at = model.pose(path.end.position)
-    assert np.linalg.norm(at.position - aside.position) <= 0.01 + 1e-6
-    assert np.abs(pin.log3(tilted.T @ at.rotation)).max() <= 0.4 + 1e-6
+    assert broken(model, tolerances, path.end.position) == []
 
 
-def refusal(asked: MotionRequest) -> PlanningError:
-    """Return why a motion of the Panda is refused."""
-    with pytest.raises(PlanningError) as caught:
-        Planner(robot('panda')).plan(asked)
-    return caught.value
-
-
-@pytest.mark.parametrize(
-    ('bounds', 'words'), [((-0.785, -0.784), '0.0010 wide'), ((0.5, -0.5), 'contradict')]
-)
-def test_what_cannot_be_is_refused(bounds: tuple[float, float], words: str) -> None:
-    """With the joint, and what to do."""
-    start = ready('panda')
-    goal = JointGoal(frozen(start + 0.5 * np.eye(7)[0]))
-    constraints = PathConstraints({'panda_joint2': bounds})
-    error = refusal(MotionRequest(start, [goal], constraints=constraints))
-    assert error.code is PlanningCode.PLANNING_FAILED
-    assert words in str(error)
-
-
-def test_a_line_holds_a_turn_exactly() -> None:
-    """A constraint that is too narrow for free motion is none for LIN."""
-    model = robot('panda')
-    pose = model.pose(ready('panda'))
+def test_what_cannot_be_is_refused() -> None:
+    """With the joint, and what to do; too narrow for free motion is not too narrow for LIN."""
+    model, start = robot('panda'), ready('panda')
+    pose = model.pose(start)
     below = PoseGoal(Pose(pose.rotation, frozen(np.add(pose.position, [0.0, 0.0, -0.1]))))
     turn = OrientationConstraint(model.tip, pose.rotation, frozen([1e-3] * 3))
     narrow = PathConstraints(orientations=[turn])
-    line = MotionRequest(ready('panda'), [below], 'LIN', constraints=narrow)
+    aside = JointGoal(frozen(start + 0.5 * np.eye(7)[0]))
+    for goal, constraints, words in (
+        (aside, PathConstraints({'panda_joint2': (-0.785, -0.784)}), '0.0010 wide'),
+        (aside, PathConstraints({'panda_joint2': (0.5, -0.5)}), 'contradict'),
+        (below, narrow, '0.0020 wide'),
+    ):
+        with pytest.raises(PlanningError, match=words) as refused:
+            Planner(model).plan(MotionRequest(start, [goal], constraints=constraints))
+        assert refused.value.code is PlanningCode.PLANNING_FAILED
+    line = MotionRequest(start, [below], 'LIN', constraints=narrow)
     assert Planner(model).plan(line).path.duration > 0.0
-    assert '0.0020 wide' in str(refusal(replace(line, planner_id='RRTConnect')))

@@ -66,31 +66,22 @@ def test_a_trajectory_is_read_as_controllers_follow_it(kinds: str) -> None:
 
 def test_an_object_ahead_is_seen_and_one_behind_is_not() -> None:
     """The pair is named, and when it would touch."""
-    halfway = places(PATH.at(0.5 * PATH.duration).position)
+    halfway, here = places(PATH.at(0.5 * PATH.duration).position), places(READY)
     ahead, behind = crate_at(0.9), crate_at(0.02)
     assert 'crate' in contact_ahead(motion(), halfway, ahead)
-    assert 'crate' in contact_ahead(motion(), places(READY), ahead)
     assert contact_ahead(motion(), halfway, behind) == ''
-    assert contact_ahead(motion(), halfway, EMPTY.scene) == ''
     assert contact_ahead(JointTrajectory(), halfway, ahead) == ''
-
-
-def test_points_may_lack_what_others_have() -> None:
-    """A trajectory whose last point has no velocities is followed, and looked at, too."""
-    trajectory = motion()
-    trajectory.points[-1].velocities = []
-    assert 'crate' in contact_ahead(trajectory, places(READY), crate_at(0.9))
-
-
-def test_joints_that_the_robot_does_not_have_do_not_count() -> None:
-    """A controller may move what no description has, beside the arm."""
-    trajectory = motion()
-    trajectory.joint_names.append('tool_changer')
-    for point in trajectory.points:
+    # the last point may lack velocities; a controller may move what no description has
+    lacking, wider = motion(), motion()
+    lacking.points[-1].velocities = []
+    wider.joint_names.append('tool_changer')
+    for point in wider.points:
         for row in (point.positions, point.velocities, point.accelerations):
             row.append(0.0)
-    assert contact_ahead(trajectory, places(READY), EMPTY.scene) == ''
-    assert 'crate' in contact_ahead(trajectory, places(READY), crate_at(0.9))
+    for trajectory in (motion(), lacking, wider):
+        assert 'crate' in contact_ahead(trajectory, here, ahead)
+    for trajectory in (motion(), wider):
+        assert contact_ahead(trajectory, here, EMPTY.scene) == ''
 
 
 class Executions:
@@ -114,42 +105,30 @@ class Executions:
         self.stopped.append((execution, code, reason))
 
 
-class Later:
-    """A thread that does its work when the test wants."""
-
-    def __init__(self) -> None:
-        self.work: list[tuple[Callable[[], Any], Callable[[Future[Any]], None]]] = []
-
-    def submit(self, work: Callable[[], Any], then: Callable[[Future[Any]], None]) -> None:
-        """Take work."""
-        self.work.append((work, then))
-
-    def run(self) -> None:
-        """Do what is to be done, and what follows from that."""
-        while self.work:
-            work, then = self.work.pop(0)
-            done: Future[Any] = Future()
-            done.set_result(work())
-            then(done)
-
-
 def test_what_begins_in_a_scene_that_has_changed_meanwhile_is_stopped() -> None:
     """Also where a look at what had begun before is not done yet."""
-    monitor = SimpleNamespace(
-        snapshot=SimpleNamespace(scene=crate_at(0.9)),
-        positions=lambda: places(READY),
-    )
-    executions, later = Executions(), Later()
+    monitor = SimpleNamespace(snapshot=SimpleNamespace(scene=crate_at(0.9)))
+    monitor.positions = lambda: places(READY)
+    executions, work = Executions(), list[tuple[Any, Any]]()
+    later = SimpleNamespace(submit=lambda *each: work.append(each))
+
+    def look() -> None:
+        while work:
+            task, then = work.pop(0)
+            done: Future[Any] = Future()
+            done.set_result(task())
+            then(done)
+
     PathWatch(monitor, executions, later)  # type: ignore[arg-type]
     started = [executions.start(motion()), executions.start(motion())]
-    later.run()
+    look()
     assert [each for each, _, _ in executions.stopped] == started
     for _, code, reason in executions.stopped:
         assert code is INVALIDATED
         assert 'crate' in reason
     monitor.snapshot.scene = EMPTY.scene
     executions.start(motion())
-    later.run()
+    look()
     assert len(executions.stopped) == len(started)
 
 
@@ -158,10 +137,9 @@ def test_the_way_to_the_first_point_counts(kinds: str) -> None:
     """A trajectory of one point is what the controller makes up from where the arm is."""
     trajectory = motion(kinds)
     del trajectory.points[:-1]
-    ahead, behind = crate_at(0.9), crate_at(-0.2)
     way = from_start(trajectory, READY.tolist())
-    assert 'crate' in contact_ahead(way, places(READY), ahead)
-    assert contact_ahead(way, places(READY), behind) == ''
+    assert 'crate' in contact_ahead(way, places(READY), crate_at(0.9))
+    assert contact_ahead(way, places(READY), crate_at(-0.2)) == ''
 
 
 @pytest.mark.parametrize('share', [0.0, 0.3, 1.0])

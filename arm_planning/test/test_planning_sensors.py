@@ -23,7 +23,7 @@ from move_group_rig import (
 )
 from moveit_msgs.msg import LinkPadding, MoveItErrorCodes, PlanningScene, PlanningSceneComponents
 from moveit_msgs.srv import GetStateValidity
-from planning_messages import box
+from planning_messages import box, pose_at
 import pytest
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
@@ -77,9 +77,7 @@ def test_a_map_blocks_and_comes_back_as_it_was_sent(rig: MoveGroupRig) -> None:
     whole = rig.scene()
     assert not whole.world.collision_objects
     rig.client.spin_until(
-        lambda: any(each.world.octomap == sent.world.octomap for each in monitored),
-        30.0,
-        'the map',
+        lambda: sent.world.octomap in [each.world.octomap for each in monitored], 30.0, 'the map'
     )
     # what was received makes the same scene again
     rig.client.call(Empty, '/clear_octomap', Empty.Request())
@@ -89,21 +87,16 @@ def test_a_map_blocks_and_comes_back_as_it_was_sent(rig: MoveGroupRig) -> None:
     assert '<octomap>' in touching(rig)
 
 
-def test_padding_counts_against_a_map(rig: MoveGroupRig) -> None:
-    """Of the links, as in MoveIt."""
+def test_motions_lead_around_a_map(rig: MoveGroupRig) -> None:
+    """A cell on the straight way of the hand; padding of the links counts, as in MoveIt."""
     # 0.5 m beside the arm nothing touches; a padding of 0.45 m reaches it
     assert rig.apply(scene_with_map(0.8, 0.6))
-    assert not touching(rig)
-    padded = change(link_padding=[LinkPadding(link_name='panda_link7', padding=0.45)])
-    assert rig.apply(padded)
-    assert {'<octomap>', 'panda_link7'} <= touching(rig)
-    padded.link_padding[0].padding = 0.0
-    assert rig.apply(padded)
-    assert not touching(rig)
-
-
-def test_motions_lead_around_a_map(rig: MoveGroupRig) -> None:
-    """A cell on the straight way of the hand."""
+    padded = change(link_padding=[LinkPadding(link_name='panda_link7')])
+    for padding, touched in ((0.45, {'<octomap>', 'panda_link7'}), (0.0, set[str]())):
+        padded.link_padding[0].padding = padding
+        assert rig.apply(padded)
+        assert touched <= touching(rig)
+        assert bool(touching(rig)) == bool(touched)
     assert rig.plan(motion_request(joint_goal(MOVED))).error_code.val == 1
     rig.positions['panda_joint1'] = -0.9
     assert rig.apply(scene_with_map(0.307, 0.6))
@@ -126,11 +119,9 @@ def test_broken_maps_are_refused_and_leave_the_scene(rig: MoveGroupRig) -> None:
             rig.process.wait_for(reason, 10.0)
             break
     rig.process.wait_for(reason, 10.0)
-    foreign = scene_with_map(0.8, 0.6)
-    foreign.world.octomap.octomap.id = 'MyTree'
+    foreign, lost = scene_with_map(0.8, 0.6), scene_with_map(0.8, 0.6)
+    foreign.world.octomap.octomap.id, lost.world.octomap.header.frame_id = 'MyTree', 'moon'
     assert not rig.apply(foreign)
-    lost = scene_with_map(0.8, 0.6)
-    lost.world.octomap.header.frame_id = 'moon'
     assert not rig.apply(lost)
     assert rig.scene().world.octomap == before
 
@@ -143,6 +134,17 @@ def transform(parent: str, child: str, x: float, z: float = 0.0, *, turned: bool
     if turned:
         message.transform.rotation.w, message.transform.rotation.z = 0.0, 1.0
     return message
+
+
+def down(x: float, z: float) -> PoseMessage:
+    """Return a pose that looks down."""
+    pose = pose_at(x, 0.0, z)
+    pose.orientation.w, pose.orientation.x = 0.0, 1.0
+    return pose
+
+
+SEEN = pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
+"""What the camera sees at 1.5 m, in the root link in [m]."""
 
 
 class Camera:
@@ -162,15 +164,12 @@ class Camera:
             60.0,
             'a listener of TF',
         )
-        static.publish(
-            TFMessage(
-                transforms=[
-                    transform('map', f'{prefix}panda_link0', -1.0),
-                    transform('map', 'table', 1.0, 0.5),
-                    transform(f'{prefix}{HAND}', 'camera_on_hand', 0.0, 0.1),
-                ]
-            )
-        )
+        transforms = [
+            transform('map', f'{prefix}panda_link0', -1.0),
+            transform('map', 'table', 1.0, 0.5),
+            transform(f'{prefix}{HAND}', 'camera_on_hand', 0.0, 0.1),
+        ]
+        static.publish(TFMessage(transforms=transforms))
 
     def see(self, age: float = 0.0) -> None:
         """Publish where the camera is: 2 m in front of the robot's root, looking back."""
@@ -183,13 +182,15 @@ class Camera:
         """Return the response to compute_ik for a pose in a frame."""
         return self.rig.ik(down(x, z), frame, ik_link_name=HAND)
 
-
-def down(x: float, z: float) -> PoseMessage:
-    """Return a pose that looks down."""
-    pose = PoseMessage()
-    pose.position.x, pose.position.z = x, z
-    pose.orientation.w, pose.orientation.x = 0.0, 1.0
-    return pose
+    def hand(self, frame: str, x: float, z: float) -> tuple[float, ...]:
+        """Return where the hand is in the solution for a pose in a frame; () if it is unknown."""
+        self.see()
+        answer = self.ik(frame, x, z)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+            assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+            return ()
+        place = self.rig.fk(HAND, answer.solution).position
+        return place.x, place.y, place.z
 
 
 @pytest.fixture(name='one_camera', scope='module')
@@ -206,39 +207,27 @@ def in_empty_scene(one_camera: Camera, rig: MoveGroupRig) -> Camera:
 
 
 def test_poses_are_taken_in_frames_of_tf(camera: Camera) -> None:
-    """Through a common ancestor, and turned."""
-
-    def arrived() -> bool:
+    """Through a common ancestor, and turned: of compute_ik, of goals, and of objects."""
+    rig = camera.rig
+    rig.client.spin_until(
+        lambda: camera.hand('camera_link', 1.5, 0.0) == SEEN, 60.0, 'a solution for the camera'
+    )
+    for frame, pose, link, code in (
+        ('camera_link', down(1.5, 0.0), HAND, MoveItErrorCodes.SUCCESS),
+        ('camera_on_hand', PoseMessage(), HAND, MoveItErrorCodes.SUCCESS),
+        # a frame of TF is no link of a goal: it would be one that stands still
+        ('panda_link0', down(0.5, 0.5), 'table', MoveItErrorCodes.INVALID_LINK_NAME),
+    ):
         camera.see()
-        answer = camera.ik('camera_link', 1.5, 0.0)
-        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-            assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
-            return False
-        place = camera.rig.fk(HAND, answer.solution).position
-        assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
-        return True
-
-    camera.rig.client.spin_until(arrived, 60.0, 'a solution in the frame of the camera')
-
-
-def test_goals_are_taken_in_frames_of_tf(camera: Camera) -> None:
-    """A plan to a pose that the camera sees; a frame on the hand is where the hand is."""
-    camera.see()
-    for frame, pose in (('camera_link', down(1.5, 0.0)), ('camera_on_hand', PoseMessage())):
-        request = motion_request(pose_goal(pose, HAND, frame))
-        answer = camera.rig.plan(request)
-        assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
-
-
-def test_objects_are_taken_in_frames_of_tf(camera: Camera) -> None:
-    """They come back in the root link."""
+        answer = rig.plan(motion_request(pose_goal(pose, link, frame)))
+        assert answer.error_code.val == code, answer.error_code
     thing = box('cup', 1.4, 0.3, 0.0)
     thing.header.frame_id = 'camera_link'
     camera.see()
-    camera.rig.add(thing)
-    (found,) = camera.rig.scene().world.collision_objects
+    rig.add(thing)
+    (found,) = rig.scene().world.collision_objects
     place = found.pose.position
-    assert found.header.frame_id == 'panda_link0'
+    assert found.header.frame_id == 'panda_link0'  # the root link
     assert (place.x, place.y, place.z) == pytest.approx((0.6, -0.3, 0.5), abs=1e-9)
 
 
@@ -267,24 +256,9 @@ def test_links_have_a_prefix_in_tf(tmp_path: Path) -> None:
     arguments = ['--ros-args', '--params-file', path, '-p', 'frame_prefix:=left/']
     with reserve() as isolation, MoveGroupRig(isolation, *arguments) as rig:
         camera = Camera(rig, 'left/')
-
-        def place(frame: str, x: float, z: float) -> tuple[float, ...]:
-            camera.see()
-            answer = camera.ik(frame, x, z)
-            if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-                return ()
-            found = camera.rig.fk(HAND, answer.solution).position
-            return found.x, found.y, found.z
-
-        seen = pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
-        rig.client.spin_until(lambda: place('camera_link', 1.5, 0.0) == seen, 60.0, 'the camera')
+        rig.client.spin_until(
+            lambda: camera.hand('camera_link', 1.5, 0.0) == SEEN, 60.0, 'the camera'
+        )
         for frame in ('left/panda_link0', 'panda_link0'):
-            assert place(frame, 0.5, 0.5) == seen
-        assert place('right/panda_link0', 0.5, 0.5) == ()
-
-
-def test_a_frame_of_tf_is_no_link_of_a_goal(camera: Camera) -> None:
-    """It would be one that stands still."""
-    camera.see()
-    answer = camera.rig.plan(motion_request(pose_goal(down(0.5, 0.5), 'table', 'panda_link0')))
-    assert answer.error_code.val == MoveItErrorCodes.INVALID_LINK_NAME
+            assert camera.hand(frame, 0.5, 0.5) == SEEN
+        assert camera.hand('right/panda_link0', 0.5, 0.5) == ()

@@ -11,7 +11,7 @@ from typing import Any
 from geometry_msgs.msg import Pose as PoseMessage
 from isolation import reserve
 from model_robots import chain_texts
-from move_group_rig import joint_goal, motion_request, MoveGroupRig, pose_goal
+from move_group_rig import joint_goal, motion_request, MoveGroupRig, parameter_file, pose_goal
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes
 import numpy as np
 import pytest
@@ -38,15 +38,9 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
     """Start move_group, with the arm at the start."""
     urdf, srdf, limits = texts()
     folder = tmp_path_factory.mktemp('chain')
-    (folder / 'limits.yaml').write_text(json.dumps({'joint_limits': limits}))
-    values = {
-        'robot_description': urdf,
-        'robot_description_semantic': srdf,
-        'joint_limits': str(folder / 'limits.yaml'),
-    }
-    path = folder / 'chain.json'
-    path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
-    arguments = ('--ros-args', '--params-file', str(path))
+    file = folder / 'limits.yaml'
+    file.write_text(json.dumps({'joint_limits': limits}))
+    arguments = ('--ros-args', '--params-file', str(parameter_file(folder, urdf, srdf, file)))
     at = dict(zip(JOINTS, START, strict=True))
     with reserve() as isolation, MoveGroupRig(isolation, *arguments, positions=at) as rig:
         yield rig

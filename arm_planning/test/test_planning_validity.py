@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from model_robots import ready, robot
 import numpy as np
@@ -41,7 +42,7 @@ from arm_planning import (
 )
 from arm_planning.constraints import _turned, ConstraintCheck, ConstraintResult, HEEDED, STEP
 from arm_planning.validity import MARGIN
-from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
+from arm_trajectory import build_path, GoalPoint, GoalRules, Path, TrajectoryGoal
 
 MODEL = panda().model('panda_arm')
 READY = frozen([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
@@ -49,6 +50,7 @@ LINK = 'panda_link8'
 TIP = MODEL.kinematics.link_pose(LINK, READY)
 SHAPES = (Box(0.1, 0.2, 0.3), Sphere(0.1), Cylinder(0.1, 0.3), Cone(0.1, 0.3))
 AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda axis: axis @ axis > 0.01)
+ANGLES = st.tuples(*(st.floats(-most, most) for most in (3.1, 1.3, 3.1))).map(np.array)
 OFFSETS = st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array)
 
 
@@ -59,6 +61,11 @@ def results(constraints: PathConstraints) -> list[ConstraintResult]:
     violations = [each.violation for each in found if each.violation]
     assert check.violated(READY) == (violations[0] if violations else '')
     return found
+
+
+def about(axis: int, angle: float) -> Array:
+    """Return a turn about one axis."""
+    return np.asarray(pin.exp3(angle * np.eye(3)[axis]))
 
 
 def region(shape: Box | Sphere | Cylinder | Cone, offset: Array) -> PlacedShape:
@@ -72,13 +79,17 @@ def at_tip(*regions: PlacedShape) -> PathConstraints:
 
 
 def test_each_constraint_has_its_result() -> None:
-    """In the order of joints, orientations and positions, with how far it is beyond."""
-    turned = TIP.rotation @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    """In the order of joints, orientations and positions, with how far it is beyond.
+
+    A link may be in any of its regions: as in MoveIt, the primitives are a union.
+    """
+    near, far = (region(Sphere(0.05), np.array([x, 0.0, 0.0])) for x in (0.0, 0.2))
+    tight = frozen([0.1, 0.1, 0.1])
     joint, other, turn, place = results(
         PathConstraints(
             {'panda_joint1': (0.3, 0.5), 'panda_joint2': (-1.0, 0.0)},
-            [OrientationConstraint(LINK, frozen(turned), frozen([0.1, 0.1, 0.1]))],
-            at_tip(region(Sphere(0.1), np.array([0.0, 0.0, 0.25]))).positions,
+            [OrientationConstraint(LINK, frozen(TIP.rotation @ about(2, np.pi / 2)), tight)],
+            at_tip(far).positions,
         )
     )
     assert other == HEEDED
@@ -88,14 +99,7 @@ def test_each_constraint_has_its_result() -> None:
     assert 'is turned by' in turn.violation
     assert place.distance == pytest.approx(0.15)
     assert f'{LINK} is outside of its region' in place.violation
-
-
-def test_a_link_may_be_in_any_of_its_regions() -> None:
-    """As in MoveIt, where the primitives of one constraint are a union."""
-    near, far = region(Sphere(0.05), np.zeros(3)), region(Sphere(0.05), np.array([0.5, 0.0, 0.0]))
     assert results(at_tip(near, far)) == results(at_tip(far, near)) == [HEEDED]
-    (outside,) = results(at_tip(far))
-    assert outside.distance == pytest.approx(0.45)
 
 
 @given(st.sampled_from(SHAPES), OFFSETS)
@@ -110,75 +114,54 @@ def test_a_region_holds_what_is_inside(
         assert result.distance > 0.0
 
 
-@given(AXES, st.floats(0.0, np.pi), AXES, AXES)
-def test_how_far_a_link_is_turned_changes_as_its_rows_say(
-    axis: Array, angle: float, wanted: Array, turn: Array
+@pytest.mark.parametrize('parameterization', Parameterization)
+@given(ANGLES, AXES, AXES)
+def test_angles_of_a_link_are_those_of_moveit_and_change_as_their_rows_say(
+    parameterization: Parameterization, angles: Array, wanted: Array, turn: Array
 ) -> None:
-    """To half a turn: the gradient, and the room for what happens until the next look."""
-    constraint = OrientationConstraint(LINK, frozen(pin.exp3(wanted)), frozen(np.ones(3)))
-    turned_by = angle * axis / np.linalg.norm(axis)
-    rotation = constraint.rotation @ pin.exp3(turned_by)
-    by_turn = np.vstack((np.zeros((3, 3)), np.eye(3)))
+    """About x, then the new y, then the new z, or a vector, to nearly half a turn.
 
-    def rows(turn: Array) -> Array:
-        pose = Pose(frozen(pin.exp3(turn) @ rotation), TIP.position)
-        return _turned(constraint, pose, by_turn)[0].values
-
-    row, _ = _turned(constraint, Pose(frozen(rotation), TIP.position), by_turn)
-    assert np.abs(row.values) == pytest.approx(np.abs(turned_by), abs=1e-6)
-    until_next = 0.5 * STEP * turn / np.linalg.norm(turn)
-    grown = np.abs(rows(until_next)) - np.abs(row.values)
-    assert grown.max() <= row.room * (1.0 + 1e-9)
-    assume(angle < np.pi - 0.1)
-    small = 1e-5 * turn / np.linalg.norm(turn)
-    change = 0.5 * (rows(small) - rows(-small))
-    assert change == pytest.approx(row.gradients @ small, abs=1e-9)
-
-
-def about(axis: int, angle: float) -> Array:
-    """Return a turn about one axis."""
-    vector = np.zeros(3)
-    vector[axis] = angle
-    return np.asarray(pin.exp3(vector))
-
-
-@given(st.floats(-3.1, 3.1), st.floats(-1.3, 1.3), st.floats(-3.1, 3.1), AXES, AXES)
-def test_euler_angles_are_those_of_moveit_and_change_as_their_rows_say(
-    x: float, y: float, z: float, wanted: Array, turn: Array
-) -> None:
-    """About x, then the new y, then the new z; the gradient, and the room until the next look."""
+    The gradient, and the room for what happens until the next look.
+    """
+    turned_by = pin.exp3(wanted)
     constraint = OrientationConstraint(
-        LINK, frozen(pin.exp3(wanted)), frozen(np.ones(3)), Parameterization.XYZ_EULER_ANGLES
+        LINK, frozen(turned_by), frozen(np.ones(3)), parameterization
     )
-    rotation = constraint.rotation @ about(0, x) @ about(1, y) @ about(2, z)
+    if parameterization is Parameterization.XYZ_EULER_ANGLES:
+        rotation = turned_by @ about(0, angles[0]) @ about(1, angles[1]) @ about(2, angles[2])
+    else:
+        angles = angles * min(1.0, 3.04 / max(float(np.linalg.norm(angles)), 1e-9))
+        rotation = turned_by @ pin.exp3(angles)
     by_turn = np.vstack((np.zeros((3, 3)), np.eye(3)))
 
-    def rows(turn: Array) -> Array:
+    def row(turn: Array) -> Any:
         pose = Pose(frozen(pin.exp3(turn) @ rotation), TIP.position)
-        return _turned(constraint, pose, by_turn)[0].values
+        return _turned(constraint, pose, by_turn)[0]
 
-    row, _ = _turned(constraint, Pose(frozen(rotation), TIP.position), by_turn)
-    assert row.values == pytest.approx([x, y, z], abs=1e-9)
-    change = np.abs(rows(0.5 * STEP * turn / np.linalg.norm(turn)) - row.values)
-    assert change.max() <= row.room * (1.0 + 1e-6)
-    small = 1e-5 * turn / np.linalg.norm(turn)
-    change = 0.5 * (rows(small) - rows(-small))
-    assert change == pytest.approx(row.gradients @ small, abs=1e-8)
+    here, turn = row(np.zeros(3)), turn / np.linalg.norm(turn)
+    if parameterization is Parameterization.XYZ_EULER_ANGLES:
+        assert here.values == pytest.approx(angles, abs=1e-9)
+    assert np.abs(here.values) == pytest.approx(np.abs(angles), abs=1e-6)
+    grown = np.abs(row(0.5 * STEP * turn).values) - np.abs(here.values)
+    assert grown.max() <= here.room * (1.0 + 1e-6)
+    small = 1e-5 * turn
+    change = 0.5 * (row(small).values - row(-small).values)
+    assert change == pytest.approx(here.gradients @ small, abs=1e-8)
 
 
-def test_an_angle_of_half_a_turn_is_any_angle() -> None:
+@pytest.mark.parametrize('parameterization', Parameterization)
+def test_an_angle_of_half_a_turn_is_any_angle(parameterization: Parameterization) -> None:
     """Also where the angle jumps from one side to the other."""
-    for parameterization in Parameterization:
-        free = frozen([0.1, 0.1, np.pi])
-        rotation = frozen(TIP.rotation @ about(2, np.pi - 1e-4))
-        turn = OrientationConstraint(LINK, rotation, free, parameterization)
-        assert ConstraintCheck(MODEL, PathConstraints(orientations=[turn])).heeds(READY)
+    rotation = frozen(TIP.rotation @ about(2, np.pi - 1e-4))
+    turn = OrientationConstraint(LINK, rotation, frozen([0.1, 0.1, np.pi]), parameterization)
+    assert ConstraintCheck(MODEL, PathConstraints(orientations=[turn])).heeds(READY)
 
 
 THIN = 0.002  # thickness of a sheet in [m], which coarse sampling would pass through
 NEAR = 0.0005  # distance of an arm that nearly touches in [m]
 MOTIONS = 40  # straight motions that are compared with a dense sampler in each scene
 TOUCH = 1e-3  # how deep a wire is touched in [m]
+SWING = [frozen(ready('panda') + turn * np.eye(7)[0]) for turn in (-0.8, 0.8)]
 
 
 @pytest.mark.parametrize('seed', range(8))
@@ -202,6 +185,12 @@ CART = (
 """A ball on a rail: its distance rate bound is exact, a straight line has no reserve."""
 
 
+def path_to(model: RobotModel, begin: Array, end: Array) -> Path:
+    """Return a straight motion of four seconds."""
+    goal = TrajectoryGoal(model.joints, [GoalPoint(4.0, end.tolist())])
+    return build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path
+
+
 @pytest.mark.parametrize('at', np.linspace(-0.93, 0.95, 12).tolist())
 def test_a_pin_beside_the_rail_is_not_passed(at: float) -> None:
     """It overlaps by half a millimetre, wherever it stands; a second pin is near elsewhere."""
@@ -212,30 +201,23 @@ def test_a_pin_beside_the_rail_is_not_passed(at: float) -> None:
     for name, place in (('pin', (at, 0.0, 0.0015)), ('other', (-at, 0.02, 0.0))):
         pose = Pose(ORIGIN.rotation, frozen(place))
         scene = scene.with_object(CollisionObject(name, Sphere(0.001), pose=pose))
-    check = ValidityCheck(model.limits, scene)
-    begin = np.array([-1.0])
-    goal = TrajectoryGoal(model.joints, [GoalPoint(4.0, [1.0])])
-    path = build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path
-    assert check.waypoints(np.array((begin, [1.0]))) is not None
-    assert check.path(path) is not None
+    check, ends = ValidityCheck(model.limits, scene), np.array([[-1.0], [1.0]])
+    assert check.waypoints(ends) is not None
+    assert check.path(path_to(model, *ends)) is not None
 
 
 def test_a_thin_sheet_is_not_passed_through() -> None:
-    """However thin it is: there is no place between two measurements."""
+    """However thin it is: there is no place between two measurements. The contact is named."""
     model = robot('panda')
-    begin, end = ready('panda').copy(), ready('panda').copy()
-    begin[0], end[0] = -0.8, 0.8
-    assert ValidityCheck(model.limits, model.scene).waypoints(np.array((begin, end))) is None
+    ends = np.array(SWING)
+    assert ValidityCheck(model.limits, model.scene).waypoints(ends) is None
     scene = with_box(model.scene, 'sheet', (2.0, THIN, 2.0), (1.2, 0.0, 0.5))
     check = ValidityCheck(model.limits, scene)
-    assert check.state(begin) is None
-    assert check.state(end) is None
-    violation = check.waypoints(np.array((begin, end)))
+    assert check.state(ends[0]) is check.state(ends[1]) is None
+    violation = check.waypoints(ends)
     assert violation is not None
     assert 'sheet' in violation.reason
-    points = [GoalPoint(3.0, end.tolist())]
-    goal, state = TrajectoryGoal(model.joints, points), RobotState.at_rest(begin)
-    path = build_path(goal, model.limits, state, GoalRules()).path
+    path = path_to(model, *ends)
     found = check.path(path)
     assert found is not None
     assert 0.0 < found.time < path.duration
@@ -257,27 +239,29 @@ def test_a_path_between_states_in_near_contact_is_found_valid() -> None:
     assert ValidityCheck(model.limits, scene).waypoints(np.array((here, away))) is None
 
 
-def plane() -> PlanningScene:
-    """The panda over a half-space, which has no box about it."""
-    model = robot('panda')
-    return model.scene.with_object(CollisionObject('ground', Plane(offset=-0.05)))
+def scenes() -> dict[str, PlanningScene]:
+    """Return the Panda over a half-space, beside a mesh, and with a box in its hand."""
+    model, draw = robot('panda'), np.random.default_rng(1)
+    points = draw.uniform(-0.2, 0.2, (30, 3)) + np.array((0.5, 0.0, 0.5))
+    rock, ground = CollisionObject('rock', Mesh(points)), Plane(offset=-0.05)
+    below = model.pose(ready('panda')).position - np.array((0.0, 0.0, 0.1))
+    loaded = with_box(
+        with_random_boxes(model, 4, 3), 'load', (0.1, 0.1, 0.2), tuple(below.tolist())
+    )
+    return {
+        'plane': model.scene.with_object(CollisionObject('ground', ground)),  # no box about it
+        'hull': model.scene.with_object(rock),
+        'carried': loaded.attached('load', model.tip, ready('panda'), touch_links=['panda_hand']),
+    }
 
 
-def hull() -> PlanningScene:
-    """The panda beside a mesh."""
-    points = np.random.default_rng(1).uniform(-0.2, 0.2, (30, 3)) + np.array((0.5, 0.0, 0.5))
-    return robot('panda').scene.with_object(CollisionObject('rock', Mesh(points)))
+def deepest_on(begin: Array, end: Array, scene: PlanningScene) -> float:
+    """Return the least distance on a straight motion in [m], as a dense sampler finds it."""
+    count = math.ceil(float(np.abs(end - begin).max()) / DENSE)
+    return float(distances(scene, np.linspace(begin, end, count)).min())
 
 
-def carried() -> PlanningScene:
-    """The panda with a box in its hand, among boxes."""
-    model = robot('panda')
-    at = tuple((model.pose(ready('panda')).position - np.array((0.0, 0.0, 0.1))).tolist())
-    scene = with_box(with_random_boxes(model, 4, 3), 'load', (0.1, 0.1, 0.2), at)
-    return scene.attached('load', model.tip, ready('panda'), touch_links=['panda_hand'])
-
-
-@pytest.mark.parametrize('scene', [plane(), hull(), carried()], ids=['plane', 'hull', 'carried'])
+@pytest.mark.parametrize('scene', scenes().values(), ids=scenes())
 def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(scene: PlanningScene) -> None:
     """Nothing passes that touches between two looks, and nothing is refused that has room."""
     check = ValidityCheck(robot('panda').limits, scene)
@@ -299,19 +283,12 @@ def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(scene: Plan
     assert 0.1 < np.mean(answers) < 0.9
 
 
-def deepest_on(begin: Array, end: Array, scene: PlanningScene) -> float:
-    """Return the least distance on a straight motion in [m], as a dense sampler finds it."""
-    count = math.ceil(float(np.abs(end - begin).max()) / DENSE)
-    return float(distances(scene, np.linspace(begin, end, count)).min())
-
-
 @pytest.mark.parametrize('angle', np.linspace(-0.75, 0.75, 12))
 def test_a_touch_in_passing_is_found(angle: float) -> None:
     """Of a wire that the turning arm touches by a millimetre, however short that is."""
-    model, begin, end = robot('panda'), ready('panda').copy(), ready('panda').copy()
-    begin[0], end[0] = -0.8, 0.8
+    model, (begin, end) = robot('panda'), SWING
     near, far = 0.3, 1.0  # distance of the wire from the axis: halved until it is touched so
-    for _ in range(20):
+    for _ in range(14):
         middle = 0.5 * (near + far)
         at = (middle * math.cos(angle), middle * math.sin(angle), 0.55)
         scene = with_box(model.scene, 'wire', (0.001, 0.001, 0.3), at)
@@ -319,6 +296,4 @@ def test_a_touch_in_passing_is_found(angle: float) -> None:
         near, far = (middle, far) if touched else (near, middle)
     check = ValidityCheck(model.limits, scene)
     assert check.near(begin, end, check.required(begin, end)) is not None
-    goal = TrajectoryGoal(model.joints, [GoalPoint(3.0, end.tolist())])
-    path = build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path
-    assert check.path(path) is not None
+    assert check.path(path_to(model, begin, end)) is not None

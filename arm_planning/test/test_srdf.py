@@ -17,8 +17,9 @@ pytestmark = pytest.mark.slow
 SAMPLES = 1000
 LINK = '<link name="{0}"><collision><origin xyz="{1}"/><geometry>{2}</geometry></collision></link>'
 JOINT = (
-    '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><origin xyz="{4}"/>'
-    '<axis xyz="{5}"/><limit lower="{6}" upper="{7}" velocity="1" effort="1"/>{8}</joint>'
+    '<joint name="to_{1}" type="revolute"><parent link="{0}"/><child link="{1}"/>'
+    '<origin xyz="{2}"/><axis xyz="{3}"/>'
+    '<limit lower="-2.5" upper="2.5" velocity="1" effort="1"/></joint>'
 )
 
 
@@ -27,18 +28,9 @@ def link(name: str, place: str = '0 0 0', shape: str = '<sphere radius="0.02"/>'
     return LINK.format(name, place, shape)
 
 
-def joint(
-    parent: str,
-    child: str,
-    place: str = '0 0 0.3',
-    *,
-    kind: str = 'revolute',
-    axis: str = '0 1 0',
-    span: tuple[float, float] = (-2.5, 2.5),
-    extra: str = '',
-) -> str:
+def joint(parent: str, child: str, place: str = '0 0 0.3', axis: str = '0 1 0') -> str:
     """Return a joint with the name of its child."""
-    return JOINT.format(f'to_{child}', kind, parent, child, place, axis, *span, extra)
+    return JOINT.format(parent, child, place, axis)
 
 
 def robot(*parts: str) -> str:
@@ -115,42 +107,32 @@ def test_groups_from_chains() -> None:
         assert pose_quality(model, model.poses['ready']) > 0.0
 
 
-def test_groups_are_added_where_an_srdf_has_none() -> None:
-    """Descriptions come with SRDFs that have pairs only; a person's own pair stays."""
-    urdf = robot(link('base'), *arm('left', 'base', '0 1 0'))
+def test_what_others_leave_out_is_added() -> None:
+    """Groups where an SRDF has pairs only, of which a person's own stays.
+
+    Limits of joints that the limits file lacks are those of the description: the wheels of a
+    mobile arm have no drive on the bus of the arm.
+    """
+    wheel = link('wheel'), joint('base', 'wheel', '0 0.5 0')
+    urdf = robot(link('base'), *wheel, *arm('left', 'base', '0 1 0'))
     mine = '<disable_collisions link1="left1" link2="left4" reason="User says so"/>'
-    text = make_srdf(urdf, f'<robot name="made_up">{mine}\n</robot>', samples=SAMPLES).text
-    semantic = parse_srdf(text)
-    assert semantic.arms == ('arm',)
-    assert 'ready' in semantic.poses['arm']
-    assert reasons(text)[frozenset(('left1', 'left4'))] == 'User says so'
-
-
-def test_joints_that_the_limits_file_lacks_have_those_of_the_description() -> None:
-    """The wheels of a mobile arm have no drive on the bus of the arm, and no line in its file."""
-    urdf = robot(
-        *(link('base'), link('wheel'), joint('base', 'wheel', '0 0.5 0')),
-        *arm('left', 'base', '0 1 0'),
-    )
     limits = {f'to_left{number}': {'max_velocity': 0.5} for number in range(1, 5)}
-    semantic = parse_srdf(make_srdf(urdf, '', limits, SAMPLES).text)
+    text = make_srdf(urdf, f'<robot name="made_up">{mine}\n</robot>', limits, SAMPLES).text
+    semantic = parse_srdf(text)
     assert 'arm_left4' in semantic.arms
+    assert 'ready' in semantic.poses['arm_left4']
+    assert reasons(text)[frozenset(('left1', 'left4'))] == 'User says so'
 
 
 def test_a_gripper_is_an_end_effector() -> None:
     """Two fingers at the end are no arms; the arm ends where they begin."""
-    fingers = [
-        part
-        for name, extra in (('one', ''), ('two', '<mimic joint="to_one"/>'))
-        for part in (
-            link(name),
-            joint(
-                'arm4', name, '0 0 0.1', kind='prismatic', axis='1 0 0', span=(0, 0.04),
-                extra=extra,
-            ),
-        )
-    ]  # fmt: skip
-    urdf = robot(link('base'), *arm('arm', 'base', '0 0 0.1'), *fingers)
+    one, two = (
+        joint('arm4', name, '0 0 0.1', '1 0 0').replace('revolute', 'prismatic')
+        for name in ('one', 'two')
+    )
+    two = two.replace('</joint>', '<mimic joint="to_one"/></joint>')
+    fingers = f'{link("one")}{one}{link("two")}{two}'.replace('-2.5', '0').replace('2.5', '0.04')
+    urdf = robot(link('base'), *arm('arm', 'base', '0 0 0.1'), fingers)
     semantic = parse_srdf(make_srdf(urdf, samples=SAMPLES).text)
     (effector,) = semantic.end_effectors
     assert (effector.parent_link, effector.parent_group) == ('arm4', 'arm')
