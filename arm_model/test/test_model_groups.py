@@ -15,11 +15,17 @@ pytestmark = pytest.mark.slow
 CHAIN = '<chain base_link="base" tip_link="tip"/>'
 
 
-def group(inner: str, more: str = '', kinds: str = 'zyyz', name: str | None = None) -> RobotModel:
+def group(
+    inner: str,
+    more: str = '',
+    kinds: str = 'zyyz',
+    name: str | None = None,
+    tip: str | None = None,
+) -> RobotModel:
     """Return a chain with a group of one's own, and further elements of the SRDF."""
     urdf, srdf, limits = chain_texts(kinds)
     srdf = srdf.replace(CHAIN, inner).replace('</robot>', f'{more}</robot>')
-    return RobotModel(urdf, srdf, limits, name)
+    return RobotModel(urdf, srdf, limits, name, tip)
 
 
 FIXED, FLOATING = (
@@ -38,11 +44,27 @@ WRIST = '<group name="wrist"><link name="link_4"/></group>'
         ('<joint name="world"/><joint name="j1"/>', FIXED, 'j1'),
         (CHAIN, '<passive_joint name="j2"/>', 'j1 j3 j4'),
         ('<group name="wrist"/><joint name="j1"/>', WRIST, 'j1 j4'),
+        # in another order it is the same arm
+        (
+            '<joint name="j4"/><joint name="j1"/><joint name="j2"/><joint name="j3"/>',
+            '',
+            'j1 j2 j3 j4',
+        ),
     ],
-)
+)  # fmt: skip
 def test_a_group_is_what_its_elements_make(inner: str, more: str, joints: str) -> None:
     """Chains, joints, links, subgroups; what does not move by itself is passed over."""
     assert ' '.join(group(inner, more, name='arm').joints) == joints
+
+
+def test_a_lift_below_the_chain_of_an_arm_is_part_of_it() -> None:
+    """A group of a joint and a group, as MoveIt's users write an arm on a lift."""
+    lifted = '<group name="all"><joint name="j1"/><group name="arm"/></group>'
+    model = group(CHAIN.replace('"base"', '"link_1"'), lifted, 'pyy', 'all')
+    assert model.joints == ('j1', 'j2', 'j3')
+    assert (model.base, model.tip, model.serial) == ('base', 'tip', True)
+    with pytest.raises(ModelError, match='does not hang on'):
+        group('<joint name="j2"/>', tip='base')
 
 
 @pytest.mark.parametrize(
@@ -53,7 +75,7 @@ def test_a_group_is_what_its_elements_make(inner: str, more: str, joints: str) -
         (
             '<group name="b"/>',
             '<group name="b"><group name="arm"/></group>',
-            'group arm contains itself',
+            'arm contains itself',
         ),
         ('<joint name="j9"/>', '', "joint 'j9' is not in the description; joints: j1"),
         ('<link name="link_9"/>', '', "no link 'link_9'"),
@@ -101,12 +123,9 @@ def test_a_group_of_a_gripper_has_its_poses_and_follower() -> None:
     hand = gripper('hand')
     assert hand.joints == ('finger',)
     assert hand.poses['open'].tolist() == [0.04]
-    apart = [
-        hand.pose(np.array([at]), 'right_link').position
-        - hand.pose(np.array([at]), 'left_link').position
-        for at in (0.0, 0.04)
-    ]
-    assert [np.linalg.norm(each) for each in apart] == pytest.approx([0.03, 0.11])
+    for at, wanted in ((0.0, 0.03), (0.04, 0.11)):
+        left, right = (hand.pose(np.array([at]), f'{side}_link') for side in ('left', 'right'))
+        assert np.linalg.norm(right.position - left.position) == pytest.approx(wanted)
 
 
 def test_a_joint_with_an_empty_range_is_refused_in_the_group_only() -> None:
