@@ -39,10 +39,12 @@ TRIANGLES = [(a, b, c) for a, b, c, _ in FACES] + [(a, c, d) for a, _, c, d in F
 SHAPE = '<geometry><sphere radius="0.03"/></geometry>'  # what :func:`chain_texts` makes links of
 
 
-def obj() -> str:
-    """Return the cube as Wavefront OBJ."""
-    lines = [f'v {x} {y} {z}' for x, y, z in CORNERS]
-    return '\n'.join(lines + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES])
+def obj(
+    corners: Sequence[Sequence[float]] = CORNERS, faces: Sequence[Sequence[int]] = TRIANGLES
+) -> str:
+    """Return a body as Wavefront OBJ, by default the cube."""
+    lines = [f'v {x} {y} {z}' for x, y, z in corners]
+    return '\n'.join(lines + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in faces])
 
 
 def stl() -> str:
@@ -150,12 +152,7 @@ def test_a_hull_is_made_once(tmp_path: Path, cache: Path, monkeypatch: pytest.Mo
         file.write_text(obj(), encoding='utf-8')
     made: list[Path] = []
     make = meshes.hulls_of_file
-
-    def counted(file: Path) -> Sequence[meshes.Hull]:
-        made.append(file)
-        return make(file)
-
-    monkeypatch.setattr(meshes, 'hulls_of_file', counted)
+    monkeypatch.setattr(meshes, 'hulls_of_file', lambda file: made.append(file) or make(file))  # type: ignore[func-returns-value]
     first = meshes.load_hulls(path)
     meshes._hulls.cache_clear()
     assert sorted(meshes.load_hulls(copy)[0].points.tolist()) == sorted(first[0].points.tolist())
@@ -172,9 +169,7 @@ def test_a_hull_is_made_once(tmp_path: Path, cache: Path, monkeypatch: pytest.Mo
 def two_cubes(gap: float) -> str:
     """Return two cubes beside each other as Wavefront OBJ, with a gap as a share of their edge."""
     second = [(x + 1.0 + gap, y, z) for x, y, z in CORNERS]
-    lines = [f'v {x} {y} {z}' for x, y, z in (*CORNERS, *second)]
-    faces = [*TRIANGLES, *(tuple(8 + corner for corner in face) for face in TRIANGLES)]
-    return '\n'.join(lines + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in faces])
+    return obj([*CORNERS, *second], [*TRIANGLES, *np.add(TRIANGLES, 8).tolist()])
 
 
 def test_bodies_that_lie_apart_have_a_hull_each(tmp_path: Path) -> None:
@@ -205,53 +200,48 @@ def test_bodies_that_lie_apart_have_a_hull_each(tmp_path: Path) -> None:
 def test_a_body_of_several_materials_is_whole(tmp_path: Path) -> None:
     """Each colour counts, as in the files that makers of arms publish."""
     path, lines = tmp_path / 'cube.obj', two_cubes(0.5).splitlines()
-    firsts = [line for line in lines if line.startswith('f')]
     colours = [f'newmtl {name}\nKd {shade} 0 0' for name, shade in (('dark', 0.1), ('bright', 1))]
     path.with_suffix('.mtl').write_text('\n'.join(colours), encoding='utf-8')
-    parts = [
-        'mtllib cube.mtl',
-        'o cube',
-        *(line for line in lines if line.startswith('v')),
-        'usemtl dark',
-        *firsts[:7],
-        'usemtl bright',
-        *firsts[7:],
-    ]
-    path.write_text('\n'.join(parts), encoding='utf-8')
-    hulls = meshes.load_hulls(path)
-    path.write_text(two_cubes(0.5), encoding='utf-8')
-    whole = meshes.load_hulls(path)
-    assert [len(each.points) for each in hulls] == [len(each.points) for each in whole]
-    coloured, plain = (
-        np.sort(np.concatenate([each.points for each in found]), axis=0)
-        for found in (hulls, whole)
-    )
-    assert np.array_equal(coloured, plain)
+    found = []
+    for text in (
+        [*lines[:16], 'usemtl dark', *lines[16:23], 'usemtl bright', *lines[23:]],
+        lines,
+    ):
+        path.write_text('\n'.join(['mtllib cube.mtl', 'o cube', *text]), encoding='utf-8')
+        found.append([each.points for each in meshes.load_hulls(path)])
+    coloured, plain = found
+    assert [len(each) for each in coloured] == [len(each) for each in plain]
+    one, other = (np.sort(np.concatenate(each), axis=0) for each in found)
+    assert np.array_equal(one, other)
 
 
+@pytest.mark.parametrize('lacking', ['a folder to write', 'a home', 'room on the disk'])
 def test_without_a_cache_hulls_are_made_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    lacking: str, tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A home that cannot be written is no reason to leave a shape out."""
-    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
-    (tmp_path / 'file').write_text('', encoding='utf-8')
-    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'file'))
-    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
+    """It is no reason to leave a shape out; what cannot be written whole is removed.
 
+    A container may run as a user whom it does not know, and who has no home.
+    """
 
-def test_without_a_home_hulls_are_made_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A container may run as a user whom it does not know."""
+    def fail(error: Exception) -> Callable[[int], None]:
+        def failing(_: int) -> None:
+            raise error
 
-    def unknown(_: int) -> None:
-        raise KeyError
+        return failing
 
-    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
-    monkeypatch.delenv('XDG_CACHE_HOME')
-    monkeypatch.delenv('HOME', raising=False)
-    monkeypatch.setattr('pwd.getpwuid', unknown)
-    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
+    path = tmp_path / 'cube.stl'
+    path.write_text(stl(), encoding='utf-8')
+    if lacking == 'a folder to write':
+        monkeypatch.setenv('XDG_CACHE_HOME', str(path))
+    elif lacking == 'a home':
+        monkeypatch.delenv('XDG_CACHE_HOME')
+        monkeypatch.delenv('HOME', raising=False)
+        monkeypatch.setattr('pwd.getpwuid', fail(KeyError()))
+    else:
+        monkeypatch.setattr('os.fsync', fail(OSError(errno.ENOSPC, 'no space left on device')))
+    assert len(meshes.load_hulls(path)[0].points) == len(CORNERS)
+    assert not cache.exists() or not list(cache.iterdir())
 
 
 def npz(points: list[list[float]]) -> bytes:
@@ -287,20 +277,6 @@ def test_a_damaged_file_of_the_cache_is_written_again(
     assert len(file.read_bytes()) == len(whole)
 
 
-def test_a_full_disk_leaves_nothing_behind(
-    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What cannot be written whole is removed."""
-
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, 'no space left on device')
-
-    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
-    monkeypatch.setattr('os.fsync', full)
-    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
-    assert not list(cache.iterdir())
-
-
 @pytest.mark.parametrize(
     ('mesh', 'words'),
     [
@@ -332,33 +308,25 @@ def test_a_damaged_mesh_is_one_note(content: str, tmp_path: Path) -> None:
         arm('<mesh filename="link.stl" scale="1 1"/>', tmp_path)
 
 
-def test_an_arm_without_any_shape_says_so() -> None:
-    """The note says that it is not checked."""
-    urdf, srdf, limits = chain_texts('zyy')
-    bare = re.sub('<collision>.*?</collision>', '', urdf)
-    model = RobotModel(bare, srdf, limits)
-    assert model.notes == ('no link has a <collision>, so self-collision is not checked',)
-
-
-def test_the_other_links_are_checked_all_the_same() -> None:
-    """One link of four has no usable shape."""
+def test_links_without_a_shape_are_named() -> None:
+    """The others are checked all the same."""
     urdf, srdf, limits = chain_texts('zyyyy')
     model = RobotModel(urdf.replace(SHAPE, '<geometry/>', 1), srdf, limits)
     checked = {link for pair in model.pairs for link in pair}
     assert checked == {'link_2', 'link_3', 'link_4', 'link_5'}
     assert 'link_1: an empty <geometry>' in model.notes[0]
+    bare = RobotModel(re.sub('<collision>.*?</collision>', '', urdf), srdf, limits)
+    assert bare.notes == ('no link has a <collision>, so self-collision is not checked',)
 
 
 def _hollow(folder: Path, scales: Sequence[float], name: str) -> None:
     """Write boxes in boxes as OBJ: each fills little of its hull, and is closed."""
-    lines: list[str] = []
+    corners, faces = [], []
     for place, scale in enumerate(scales):
-        first = 16 * place + 1
-        for each in (scale, 0.9 * scale):
-            lines += [f'v {x + 9 * place} {y} {z}' for x, y, z in _scaled(each)]
-        lines += [f'f {a + first} {b + first} {c + first}' for a, b, c in TRIANGLES]
-        lines += [f'f {c + first + 8} {b + first + 8} {a + first + 8}' for a, b, c in TRIANGLES]
-    (folder / name).write_text('\n'.join(lines), encoding='utf-8')
+        for each, step in ((scale, 1), (0.9 * scale, -1)):
+            faces += [[len(corners) + corner for corner in face[::step]] for face in TRIANGLES]
+            corners += [(each * x + 9 * place, each * y, each * z) for x, y, z in CORNERS]
+    (folder / name).write_text(obj(corners, faces), encoding='utf-8')
 
 
 def test_a_body_that_takes_too_long_is_given_up_once(
@@ -395,27 +363,20 @@ def _extruded(outline: list[tuple[int, int]], flat: list[tuple[int, int, int]]) 
     faces = [each[::-1] for each in flat]
     faces += [(a + count, b + count, c + count) for a, b, c in flat]
     faces += [each for a, b in walls for each in ((a, b, b + count), (a, b + count, a + count))]
-    corners = [f'v {x} {y} {z}' for z in (0, 1) for x, y in outline]
-    return '\n'.join(corners + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in faces])
+    return obj([(x, y, z) for z in (0, 1) for x, y in outline], faces)
 
 
 def _ring(around: int = 24, across: int = 12) -> str:
     """Return a torus of radii 1 and 0.2 as OBJ."""
-    turns = 2 * math.pi * np.arange(around) / around
-    tube = 2 * math.pi * np.arange(across) / across
-    corners = [
-        f'v {(1 + 0.2 * math.cos(b)) * math.cos(a)} {(1 + 0.2 * math.cos(b)) * math.sin(a)}'
-        f' {0.2 * math.sin(b)}'
-        for a, b in product(turns.tolist(), tube.tolist())
-    ]
+    a, b = np.meshgrid(*(2 * math.pi * np.arange(n) / n for n in (around, across)), indexing='ij')
+    far = 1 + 0.2 * np.cos(b)
+    corners = np.stack((far * np.cos(a), far * np.sin(a), 0.2 * np.sin(b)), axis=-1).reshape(-1, 3)
     faces = []
     for i, j in product(range(around), range(across)):
-        at = [
-            (i + di) % around * across + (j + dj) % across + 1
-            for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))
-        ]
-        faces += [f'f {at[0]} {at[1]} {at[2]}', f'f {at[0]} {at[2]} {at[3]}']
-    return '\n'.join(corners + faces)
+        steps = ((0, 0), (1, 0), (1, 1), (0, 1))
+        at = [(i + di) % around * across + (j + dj) % across for di, dj in steps]
+        faces += [at[:3], [at[0], *at[2:]]]
+    return obj(corners.tolist(), faces)
 
 
 FORK = _extruded(
@@ -424,13 +385,12 @@ FORK = _extruded(
 )
 
 
+BOOMERANG = _extruded([(0, 0), (8, 0), (1, 1), (0, 8)], [(0, 1, 2), (0, 2, 3)])
+
+
 @pytest.mark.parametrize(
     ('mesh', 'free'),
-    [
-        (FORK, (3.0, 4.0, 0.5)),
-        (_extruded([(0, 0), (8, 0), (1, 1), (0, 8)], [(0, 1, 2), (0, 2, 3)]), (3.0, 3.0, 0.5)),
-        (_ring(), (0.0, 0.0, 0.0)),
-    ],
+    [(FORK, (3.0, 4.0, 0.5)), (BOOMERANG, (3.0, 3.0, 0.5)), (_ring(), (0.0, 0.0, 0.0))],
     ids=['fork', 'boomerang', 'ring'],
 )
 def test_pieces_of_a_body_hold_it_and_leave_its_gap_free(
@@ -467,44 +427,34 @@ def test_a_body_that_cannot_be_cut_keeps_its_hull_and_is_named(tmp_path: Path) -
     assert any('link_1 (' in note and 'not closed' in note for note in model.notes)
 
 
-def _scaled(scale: float) -> list[tuple[float, float, float]]:
-    return [(scale * x, scale * y, scale * z) for x, y, z in CORNERS]
-
-
 def test_links_that_always_touch_are_not_checked_and_named() -> None:
-    """Adjacent ones where the SRDF has no word about pairs; always touching ones in any case."""
+    """Adjacent ones where the SRDF has no word about pairs; always touching ones in any case.
+
+    A matrix with any word has the last one, as in MoveIt: the rest of it may be forgotten.
+    """
     chained = {('link_1', 'link_2'), ('link_2', 'link_3'), ('link_3', 'link_4')}
     small = arm('<sphere radius="0.03"/>')
     assert set(small.pairs) == {('link_1', 'link_3'), ('link_1', 'link_4'), ('link_2', 'link_4')}
     assert 'link_1 and link_2' in small.notes[0]
-    word = '<disable_collisions link1="base" link2="tip"/>'
-    assert chained < set(arm('<sphere radius="0.03"/>', srdf=word).pairs)
-    large = arm('<sphere radius="0.15"/>', srdf=word)
+    word = '<{}_collisions link1="{}" link2="{}"/>'
+    other = word.format('disable', 'base', 'tip')
+    assert chained < set(arm('<sphere radius="0.03"/>', srdf=other).pairs)
+    large = arm('<sphere radius="0.15"/>', srdf=other)
     assert not chained & set(large.pairs)
     assert len(large.pairs) == len(small.pairs)
     assert 'disable_collisions' in large.notes[0]
-
-
-def test_links_that_always_touch_are_checked_where_the_srdf_says_so() -> None:
-    """An enable_collisions is explicit; what it brings about is said."""
-    word = '<enable_collisions link1="link_1" link2="link_2"/>'
-    model = arm('<sphere radius="0.15"/>', srdf=word)
-    assert ('link_1', 'link_2') in model.pairs
-    assert ('link_2', 'link_3') not in model.pairs
-    dropped, kept = (note for note in model.notes if 'touch wherever' in note)
+    one = word.format('disable', 'link_1', 'link_2')
+    notes = arm('<sphere radius="0.03"/>', srdf=one).notes
+    (note,) = (note for note in notes if note.startswith('adjacent links'))
+    assert 'link_2 and link_3, link_3 and link_4' in note
+    assert 'link_1 and link_2' not in note
+    # an enable_collisions is explicit; what it brings about is said
+    enabled = arm('<sphere radius="0.15"/>', srdf=word.format('enable', 'link_1', 'link_2'))
+    assert chained & set(enabled.pairs) == {('link_1', 'link_2')}
+    dropped, kept = (note for note in enabled.notes if 'touch wherever' in note)
     assert 'link_1 and link_2' not in dropped
     assert 'link_1 and link_2' in kept
     assert 'enable_collisions' in kept
-
-
-def test_adjacent_links_that_one_disabled_pair_leaves_checked_are_named() -> None:
-    """A matrix with any word has the last one, as in MoveIt: the rest of it may be forgotten."""
-    model = arm(
-        '<sphere radius="0.03"/>', srdf='<disable_collisions link1="link_1" link2="link_2"/>'
-    )
-    (note,) = (note for note in model.notes if note.startswith('adjacent links'))
-    assert 'link_2 and link_3, link_3 and link_4' in note
-    assert 'link_1 and link_2' not in note
 
 
 def test_an_elbow_that_folds_the_arm_onto_itself_is_in_contact(tmp_path: Path) -> None:
