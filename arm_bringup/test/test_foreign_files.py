@@ -47,18 +47,18 @@ def found(folder: Path) -> Robot:
     return find_robot(f'{folder}{os.sep}', folder)
 
 
-def test_names_that_moveit_and_vendors_give_their_files(folder: Path) -> None:
-    """A plain URDF, a SRDF of xacro, and joint_limits.yaml."""
+def test_names_that_moveit_and_vendors_give_their_files(folder: Path, tmp_path: Path) -> None:
+    """A plain URDF, a SRDF of xacro, and joint_limits.yaml.
+
+    robot.yaml names files elsewhere: the package of a vendor stays where it is; paths count from
+    the robot folder.
+    """
     (folder / 'arm.srdf.xacro').write_text(f'<robot name="arm" {XACRO}/>')
     (folder / 'joint_limits.yaml').touch()
     robot = found(folder)
     assert robot.lacking == ''
     assert '<link name="base"/>' in read_description(robot)
     assert '<robot name="arm"/>' in read_semantic(robot)
-
-
-def test_robot_yaml_names_files_elsewhere(folder: Path, tmp_path: Path) -> None:
-    """The package of a vendor stays where it is; paths count from the robot folder."""
     config = tmp_path / 'vendor_moveit_config' / 'config'
     config.mkdir(parents=True)
     (config / 'vendor.srdf').write_text('<robot name="vendor"/>')
@@ -107,26 +107,26 @@ def test_xacro_arguments_of_the_folder_and_of_the_command_line(folder: Path) -> 
         parse([f'{folder}{os.sep}', '--xacro-arg', 'kind=ur10e'])
 
 
-def test_the_tip_of_robot_yaml_is_that_of_its_main_group(folder: Path) -> None:
-    """It is not taken for the end of another group of the command line."""
+def test_the_tip_of_robot_yaml_is_that_of_its_main_group(folder: Path, tmp_path: Path) -> None:
+    """It is not taken for the end of another group of the command line.
+
+    Without a group it is that of the default one: of several arms the first.
+    """
     (folder / 'robot.yaml').write_text('{group: [left, right], tip_link: left_tool}')
-    place = f'{folder}{os.sep}'
-    for argv, tip in (
-        ([], 'left_tool'),
-        (['--group', 'left'], 'left_tool'),
-        (['--group', 'right'], ''),
-        (['--group', 'right', '--group', 'left'], ''),
-    ):
-        assert locate(parse([place, *argv])[0]).tip_link == tip
-
-
-def test_the_tip_of_a_robot_yaml_without_group_is_that_of_the_default_one(tmp_path: Path) -> None:
-    """Where the SRDF has several arms, it is the end of the first."""
-    place = f'{write_two_arms(tmp_path / "two_arms")}{os.sep}'
-    with (tmp_path / 'two_arms' / 'robot.yaml').open('a') as file:
+    other = write_two_arms(tmp_path / 'two_arms')
+    with (other / 'robot.yaml').open('a') as file:
         file.write('tip_link: left_lift_link\n')
-    for argv, tip in (([], True), (['--group', 'left'], True), (['--group', 'right'], False)):
-        assert bool(locate(parse([place, *argv])[0]).tip_link) == tip
+    left, right = ['--group', 'left'], ['--group', 'right']
+    for place, argv, tip in (
+        (folder, [], 'left_tool'),
+        (folder, left, 'left_tool'),
+        (folder, right, ''),
+        (folder, [*right, *left], ''),
+        (other, [], 'left_lift_link'),
+        (other, left, 'left_lift_link'),
+        (other, right, ''),
+    ):
+        assert locate(parse([f'{place}{os.sep}', *argv])[0]).tip_link == tip, (place, argv)
 
 
 def test_an_arm_that_is_named_as_an_end_effector_is_an_arm(tmp_path: Path) -> None:
@@ -189,27 +189,18 @@ def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_pat
 def test_meshes_beside_the_description_are_found_by_every_node(folder: Path) -> None:
     """A relative path counts from the description; others stay as they are."""
     names = ['meshes/a b.stl', 'package://vendor/c.stl', 'file:///d.stl', '/e.stl']
-    shapes = ''.join(
-        f'<collision><geometry><mesh scale="1 1 1" filename="{name}"/></geometry></collision>'
-        for name in names
-    )
-    (folder / 'arm.urdf').write_text(
-        f'<robot name="arm"><link name="base">{shapes}</link></robot>'
-    )
+    shape = '<collision><geometry><mesh scale="1 1 1" filename="{}"/></geometry></collision>'
+    link = f'<link name="base">{"".join(map(shape.format, names))}</link>'
+    (folder / 'arm.urdf').write_text(f'<robot name="arm">{link}</robot>')
     located = re.findall('filename="(.*?)"', read_description(found(folder)))
     assert located == [f'{folder.as_uri()}/meshes/a%20b.stl', *names[1:]]
 
 
-def test_an_argument_without_a_value_says_how_to_give_it(tmp_path: Path) -> None:
-    """Xacro's own words have no remedy."""
-    file = tmp_path / 'arm.urdf.xacro'
-    file.write_text(f'<robot name="$(arg name)" {XACRO}/>')
-    with pytest.raises(DescriptionError, match=r"'name' has no value.*--xacro-arg name:=VALUE"):
-        expand_xacro(file)
-
-
 def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) -> None:
-    """Their includes are left out with the calls of their macros; the rest stays."""
+    """Their includes are left out with the calls of their macros; the rest stays.
+
+    Only what is missing is left out: what is there and wrong is reported.
+    """
     file = tmp_path / 'arm.urdf.xacro'
     file.write_text(
         f'<robot name="arm" {XACRO}>'
@@ -224,22 +215,18 @@ def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) ->
     assert '<link name="base"/>' in urdf
     assert '<link name="tool0"/>' in urdf
     assert 'xacro:' not in urdf
-    file.write_text(file.read_text().replace('xacro:arm_gazebo', 'xacro:arm_gripper'))
-    with pytest.raises(DescriptionError, match='unknown macro name: xacro:arm_gripper'):
-        expand_xacro(file)
-
-
-def test_one_that_is_there_and_wrong_is_reported(tmp_path: Path) -> None:
-    """Only what is missing is left out."""
-    (tmp_path / 'arm.ros2_control.xacro').write_text(
-        f'<robot {XACRO}><link name="${{1/0}}"/></robot>'
-    )
-    file = tmp_path / 'arm.urdf.xacro'
-    file.write_text(
-        f'<robot name="arm" {XACRO}><xacro:include filename="arm.ros2_control.xacro"/></robot>'
-    )
-    with pytest.raises(DescriptionError, match='division by zero'):
-        expand_xacro(file)
+    wrong = f'<robot {XACRO}><link name="${{1/0}}"/></robot>'
+    (tmp_path / 'arm.ros2_control.xacro').write_text(wrong)
+    include = '<xacro:include filename="arm.ros2_control.xacro"/>'
+    for text, words in (
+        (file.read_text().replace('arm_gazebo', 'arm_gripper'), 'macro name: xacro:arm_gripper'),
+        (f'<robot name="arm" {XACRO}>{include}</robot>', 'division by zero'),
+        # xacro's own words have no remedy
+        (f'<robot name="$(arg name)" {XACRO}/>', r"'name' has no value.*--xacro-arg name:=VALUE"),
+    ):
+        file.write_text(text)
+        with pytest.raises(DescriptionError, match=words):
+            expand_xacro(file)
 
 
 JOINT = (
@@ -267,12 +254,16 @@ def groups(folder: Path, drives: str, settings: str = '') -> MovedGroups:
 
 def test_all_arms_and_tools_with_drives_are_moved(folder: Path) -> None:
     """Unless one is named; groups of groups, and what overlaps, only by name."""
-    assert groups(folder, 'abcd') == MovedGroups(('left', 'right'), ('hand',))
-    assert groups(folder, 'ab') == MovedGroups(('left', 'right'))
-    assert groups(folder, 'bc') == MovedGroups(('right',), ('hand',))
-    assert groups(folder, 'abc', 'group: both') == MovedGroups(('both',), ('hand',))
-    assert groups(folder, 'abcd', 'group: [wide, right]').arms == ('wide', 'right')
-    assert groups(folder, 'c').arms == ('hand',)
+    both, hand = ('left', 'right'), ('hand',)
+    for drives, settings, moved in (
+        ('abcd', '', MovedGroups(both, hand)),
+        ('ab', '', MovedGroups(both)),
+        ('bc', '', MovedGroups(('right',), hand)),
+        ('abc', 'group: both', MovedGroups(('both',), hand)),
+        ('abcd', 'group: [wide, right]', MovedGroups(('wide', 'right'), hand)),
+        ('c', '', MovedGroups(hand)),
+    ):
+        assert groups(folder, drives, settings) == moved, (drives, settings)
 
 
 @pytest.mark.parametrize(
@@ -303,9 +294,8 @@ def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(urdf_reader, 'expand_xacro', counted)
     (folder / 'arm.urdf').unlink()
     for turn, link in enumerate(('base', 'tip'), 1):
-        (folder / 'arm.xacro').write_text(
-            f'<robot name="arm" {XACRO}><link name="{link}"/></robot>'
-        )
+        text = f'<robot name="arm" {XACRO}><link name="{link}"/></robot>'
+        (folder / 'arm.xacro').write_text(text)
         robot = found(folder)
         for _ in range(2):
             assert f'<link name="{link}"/>' in read_description(robot)
