@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 import shutil
 import signal
+import subprocess
 
 from isolation import Isolation
 import pytest
@@ -85,6 +86,14 @@ def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorksp
     return workspace
 
 
+def ended(process: subprocess.Popen[str], sent: signal.Signals = signal.SIGINT) -> str:
+    """End a bring-up; return what it has said since."""
+    process.send_signal(sent)
+    rest, _ = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 0, rest
+    return rest
+
+
 @pytest.mark.slow
 def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
     workspace: SmallWorkspace,
@@ -92,24 +101,16 @@ def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
     """Every process says good-bye in its turn; nothing is left in the temporary folder."""
     with workspace.bringup('panda', '--simulate', '--can', 'auto') as process:
         seen = read_until(process, 'all is ready')
-        process.send_signal(signal.SIGINT)
-        rest, _ = process.communicate(timeout=TIMEOUT)
-    assert process.returncode == 0, rest
+        rest = ended(process)
     assert 'panda on CAN bus udp_multicast' in seen
     assert '    ros2 service call /panda_joint1/target canopen_interfaces' in seen
     byes = [line.split()[0] for line in rest.splitlines() if line.endswith('| bye')]
     assert byes == ['master', 'slaves']
     assert list(workspace.folder.glob('arm_bringup-*/')) == []
-
-
-@pytest.mark.slow
-def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) -> None:
-    """And no slaves are started: the master would find two drives for each."""
+    # hardware is on can0, and no slaves are started: the master would find two drives for each
     with workspace.bringup('panda') as process:
         seen = read_until(process, 'all is ready')
-        process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=TIMEOUT)
-    assert process.returncode == 0
+        ended(process, signal.SIGTERM)
     assert 'panda on CAN bus can0' in seen
     assert 'slaves' not in seen
     assert 'ros2 service call /panda_joint1/init' in seen
@@ -117,33 +118,37 @@ def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) ->
 
 
 @pytest.mark.slow
-def test_a_master_that_never_gets_ready_ends_it(workspace: SmallWorkspace) -> None:
-    """After the time-out that was asked for; what it waited for is said."""
+def test_what_cannot_start_ends_it(workspace: SmallWorkspace) -> None:
+    """A master that does not get ready, after the time-out; an executable that is not built."""
     workspace.install('arm_canopen', 'master', line='waiting for panda_joint3', ready=False)
     code, output = workspace.run('panda', '--simulate', '--can', 'auto', '--timeout', '1')
     assert code == 1
     assert 'master did not get ready' in output
     assert 'waiting for panda_joint3' in output.split('error: ')[-1]
+    (workspace.folder / 'prefix/lib/canopen_sim/fake_slaves').unlink()
+    code, output = workspace.run('panda', '--simulate', '--can', 'auto')
+    assert code == 2
+    assert 'make build' in output
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('arguments', 'words'),
+    ('arguments', 'code', 'words'),
     [
-        (['pandora'], "no robot 'pandora'; robots: gp110, panda"),
-        (['./nowhere'], 'does not exist'),
-        (['panda', '--timeout', 'soon'], 'soon'),
-        (['panda', '--timeout', 'nan'], 'no number of seconds above 0'),
-        ([], 'robot'),
+        (['pandora'], 2, "no robot 'pandora'; robots: gp110, panda"),
+        (['./nowhere'], 2, 'does not exist'),
+        (['panda', '--timeout', 'soon'], 2, 'soon'),
+        (['panda', '--timeout', 'nan'], 2, 'no number of seconds above 0'),
+        ([], 2, 'robot'),
+        (['--help'], 0, 'robots: gp110, panda'),
     ],
-    ids=['unknown', 'no folder', 'no number', 'no time', 'nothing'],
 )
 def test_what_cannot_be_started_says_so_at_once(
-    workspace: SmallWorkspace, arguments: list[str], words: str
+    workspace: SmallWorkspace, arguments: list[str], code: int, words: str
 ) -> None:
-    """With exit code 2, and no traceback."""
-    code, output = workspace.run(*arguments)
-    assert code == 2
+    """With exit code 2, and no traceback; the help has the robots, too."""
+    found, output = workspace.run(*arguments)
+    assert found == code
     assert words in output
     assert 'Traceback' not in output
 
@@ -163,15 +168,6 @@ def test_a_robot_without_its_eds_says_which_file_and_line(workspace: SmallWorksp
 
 
 @pytest.mark.slow
-def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> None:
-    """A missing executable is reported with the remedy."""
-    (workspace.folder / 'prefix/lib/canopen_sim/fake_slaves').unlink()
-    code, output = workspace.run('panda', '--simulate', '--can', 'auto')
-    assert code == 2
-    assert 'make build' in output
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize('what', ['bus', 'namespace'])
 def test_a_second_bring_up_on_the_same_is_refused(
     workspace: SmallWorkspace, isolation: Isolation, what: str
@@ -188,9 +184,7 @@ def test_a_second_bring_up_on_the_same_is_refused(
         assert code == 2
         assert f'process {first.pid}' in output
         assert isolation.bus in output if what == 'bus' else '--namespace' in output
-        first.send_signal(signal.SIGINT)
-        assert 'bye' in first.communicate(timeout=TIMEOUT)[0]
-        assert first.returncode == 0
+        assert 'bye' in ended(first)
 
 
 @pytest.mark.slow
@@ -209,9 +203,7 @@ def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) 
             buses.add(found[1])
         assert len(buses) == 2
         for process in running:
-            process.send_signal(signal.SIGINT)
-            process.communicate(timeout=TIMEOUT)
-            assert process.returncode == 0
+            ended(process)
 
 
 @pytest.mark.slow
@@ -230,19 +222,9 @@ def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
         workspace.install(package, name, line=f'{line} in {{__ns}}')
     with workspace.bringup(f'{folder}/', '--simulate') as process:
         seen = read_until(process, 'all is ready')
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=TIMEOUT)
+        ended(process)
     assert 'in namespace /cell' in seen
     assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(LINES)
-
-
-@pytest.mark.slow
-def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
-    """And what each argument means."""
-    code, output = workspace.run('--help')
-    assert code == 0
-    for words in ('robots: gp110, panda', '--simulate', '--can', 'can0', 'Ctrl-C'):
-        assert words in output
 
 
 @pytest.mark.slow

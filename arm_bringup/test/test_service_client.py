@@ -78,7 +78,7 @@ def test_drives_are_enabled_when_they_have_booted(
     said: list[str] = []
     booted = threading.Event()
     with enabling(['arm'], 'mode', said.append, booted=booted):
-        time.sleep(3.0)
+        time.sleep(1.5)
         assert drives.calls == []
         if by_heartbeat:
             states.publish(String(data='START'))

@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rclpy.context import Context
@@ -28,72 +31,78 @@ from process_supervisor import EVERY_NODE, ProcessSpec, RosOptions, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
 PARAMETERS = Path('/tmp/parameters.yaml')
+FILES = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
+FindExecutable = Callable[[str, str], Path | None]
 
 
 def my_robot(folder: Path) -> Robot:
     """Return a robot whose files may not be there yet."""
-    return Robot(
-        'my',
-        folder / 'bus.yml',
-        folder / 'my.urdf.xacro',
-        folder / 'my.srdf',
-        folder / 'limits.yaml',
-        folder / 'controllers.yaml',
+    bus, urdf, srdf, limits, controllers = (
+        folder / name
+        for name in ('bus.yml', 'my.urdf.xacro', 'my.srdf', 'limits.yaml', 'controllers.yaml')
     )
+    return Robot('my', bus, urdf, srdf, limits, controllers)
 
 
-class Underlay:
-    """Executables of packages that are there."""
+def underlay(folder: Path, *packages: str) -> FindExecutable:
+    """Return what finds executables of packages that are there."""
 
-    def __init__(self, folder: Path, *packages: str) -> None:
-        self.folder = folder
-        self.packages = packages
-
-    def find(self, package: str, name: str) -> Path | None:
-        """Answer as find_executable does."""
-        if package not in self.packages:
+    def find(package: str, name: str) -> Path | None:
+        if package not in packages:
             return None
-        file = self.folder / package / name
+        file = folder / package / name
         file.parent.mkdir(exist_ok=True)
         file.touch(mode=0o755)
         return file
 
+    return find
+
 
 def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSpec]:
     """Plan a stack on an underlay with arm_canopen and more."""
-    names = ('arm_canopen', 'arm_bringup', 'canopen_sim', *packages)
-    find = Underlay(folder, *names).find
+    find = underlay(folder, 'arm_canopen', 'arm_bringup', 'canopen_sim', *packages)
     return {spec.name: spec for spec in arm_processes(stack, PARAMETERS, find)}
 
 
+def parameter_files(spec: ProcessSpec) -> list[Path]:
+    """Return the parameter files of a process, in their order."""
+    return [Path(spec.argv[n + 1]) for n, word in enumerate(spec.argv) if word == '--params-file']
+
+
 def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
-    """It gets the files of the robot, later ones counting more, and needs no other publisher."""
-    files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
+    """It gets the files of the robot, later ones counting more, and needs no other publisher.
+
+    move_group is one process more, with the same files, and ends before the drives.
+    """
     own = {'diagnostics_period': '0.2'}
-    stack = Stack(
-        ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_parameters=own, master_files=files
-    )
+    fields: dict[str, Any] = {'master_parameters': own, 'master_files': FILES, 'simulate': True}
+    stack = Stack(ROBOT, 'can0', master=MOTION_NODE, **fields)
     found = processes(tmp_path, stack, 'arm_servo')
     assert set(found) == {'slaves', 'master'}
     argv = found['master'].argv
     assert argv[0].endswith('arm_servo/motion_node')
     assert {'bus_config:=/robots/panda/bus.yml', 'diagnostics_period:=0.2'} < {*argv}
     assert 'bus_config:=/robots/panda/bus.yml' in found['slaves'].argv
-    named = [Path(argv[n + 1]) for n, word in enumerate(argv) if word == '--params-file']
-    assert named == [PARAMETERS, *files]
+    assert parameter_files(found['master']) == [PARAMETERS, *FILES]
+    stack = replace(stack, plan=True)
+    found = processes(tmp_path, stack, 'arm_servo', 'arm_planning')
+    assert set(found) == {'slaves', 'master', 'planner'}
+    assert parameter_files(found['planner']) == [PARAMETERS, *FILES]
+    assert found['master'].stop_order < found['planner'].stop_order < found['slaves'].stop_order
+    with pytest.raises(StartError, match='arm_planning'):
+        processes(tmp_path, stack, 'arm_servo')
 
 
 @pytest.mark.parametrize('words', [('-p', 'rate:=7'), ('--params-file', '/home/me/my.yaml')])
 def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) -> None:
     """It comes behind all parameters and files of the bring-up."""
-    files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
     ros = RosOptions('left', words)
-    stack = Stack(ROBOT, 'can0', True, master=MOTION_NODE, master_files=files, ros=ros)
+    stack = Stack(ROBOT, 'can0', True, master=MOTION_NODE, master_files=FILES, ros=ros)
     names = ('arm_canopen', 'arm_bringup', 'arm_servo', 'canopen_sim', 'robot_viewer')
-    find = Underlay(tmp_path, *names).find
+    find = underlay(tmp_path, *names)
     specs = [
         *arm_processes(stack, PARAMETERS, find),
-        controller_process(files, PARAMETERS, 1.0, find, ros),
+        controller_process(FILES, PARAMETERS, 1.0, find, ros),
     ]
     assert len(specs) == 4
     assert {spec.argv[-2:] for spec in specs} == {words}
@@ -105,16 +114,14 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
     """Whatever the robot's own file says of that node, by name or by pattern."""
     robot = my_robot(tmp_path)
     robot.semantic.write_text('<robot name="my"><group name="arm"/></robot>')
-    own = {'ros__parameters': {'rate': 1}}
+    own, other = ({'ros__parameters': {'rate': rate}} for rate in (1, 9))
     robot.controllers.write_text(json.dumps({'/**': own, 'servo_node': own}))
     user = tmp_path / 'user.yaml'
-    user.write_text(
-        json.dumps({RosOptions(namespace).node_name(spelling): {'ros__parameters': {'rate': 9}}})
-    )
+    user.write_text(json.dumps({RosOptions(namespace).node_name(spelling): other}))
     said = ['-p', 'rate:=9'] if spelling == '/**' else ['--params-file', str(user)]
     ros = RosOptions(namespace, tuple(said))
     files = motion_files(robot, tmp_path, ros, MovedGroups(('arm',)))
-    find = Underlay(tmp_path, 'arm_servo').find
+    find = underlay(tmp_path, 'arm_servo')
     argv = controller_process(files[:-1], files[-1], 1.0, find, ros).argv
     context = Context()
     init_ros(argv, context)
@@ -127,8 +134,8 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
 def test_master_without_arm_servo(tmp_path: Path) -> None:
     """Where it is not built, or the robot lacks its files, the plain master runs, and why."""
     robot = my_robot(tmp_path)
-    bare = Underlay(tmp_path, 'arm_canopen').find
-    full = Underlay(tmp_path, 'arm_canopen', 'arm_servo').find
+    bare = underlay(tmp_path, 'arm_canopen')
+    full = underlay(tmp_path, 'arm_canopen', 'arm_servo')
     assert choose_master(robot, bare) == (MASTER, MAKE_MOVE)
     assert choose_master(robot, full)[0] == MASTER
     assert 'lacks my.srdf and limits.yaml' in choose_master(robot, full)[1]
@@ -144,53 +151,28 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
 
 
 def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> None:
-    """Everything else is the same."""
-    without = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_viewer')
-    seen = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True, view=True), 'robot_viewer')
+    """Everything else is the same. The master disables the drives, so it stops before them."""
+    plain = Stack(ROBOT, 'can0', simulate=True)
+    without = processes(tmp_path, plain, 'robot_viewer')
+    seen = processes(tmp_path, replace(plain, view=True), 'robot_viewer')
     viewer = seen.pop('viewer')
     assert seen == without
     assert viewer.stop_order > seen['master'].stop_order  # STOP is there until then
-    unbuilt = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True, view=True))
-    assert 'viewer' not in unbuilt
-
-
-def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
-    """It disables the drives, so they must still be there; the listeners go between."""
-    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_state_publisher')
-    orders = {name: spec.stop_order for name, spec in found.items()}
+    assert 'viewer' not in processes(tmp_path, replace(plain, view=True))
+    orders = {name: spec.stop_order for name, spec in without.items()}
     assert orders['master'] < orders['robot_state'] < orders['slaves']
 
 
-@pytest.mark.parametrize(
-    ('packages', 'taken'),
-    [
-        (['robot_viewer'], 'robot_viewer'),
-        (['robot_viewer', 'robot_state_publisher'], 'robot_state_publisher'),
-    ],
-    ids=['ours', 'public'],
-)
+@pytest.mark.parametrize('packages', [['robot_viewer'], ['robot_viewer', 'robot_state_publisher']])
 def test_the_public_robot_state_publisher_runs_where_it_is_installed(
-    tmp_path: Path, packages: list[str], taken: str
+    tmp_path: Path, packages: list[str]
 ) -> None:
     """Ours elsewhere, which says when it is ready; it is no reason to end when it dies."""
-    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), *packages)
-    assert not found['robot_state'].required
-    assert found['robot_state'].notifies_ready == (taken == 'robot_viewer')
-    assert found['robot_state'].argv[0].endswith(f'{taken}/robot_state_publisher')
-
-
-def test_move_group_has_what_the_master_has(tmp_path: Path) -> None:
-    """It is one process more, with the same description and groups, and ends before the drives."""
-    files = (Path('/r/motion.yaml'),)
-    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_files=files, plan=True)
-    found = processes(tmp_path, stack, 'arm_servo', 'arm_planning')
-    assert set(found) == {'slaves', 'master', 'planner'}
-    argv = found['planner'].argv
-    named = [Path(argv[n + 1]) for n, word in enumerate(argv) if word == '--params-file']
-    assert named == [PARAMETERS, *files]
-    assert found['master'].stop_order < found['planner'].stop_order < found['slaves'].stop_order
-    with pytest.raises(StartError, match='arm_planning'):
-        processes(tmp_path, stack, 'arm_servo')
+    stack = Stack(ROBOT, 'can0', simulate=True)
+    publisher = processes(tmp_path, stack, *packages)['robot_state']
+    assert not publisher.required
+    assert publisher.notifies_ready == (packages[-1] == 'robot_viewer')
+    assert publisher.argv[0].endswith(f'{packages[-1]}/robot_state_publisher')
 
 
 def test_move_group_knows_the_controller_by_its_name(tmp_path: Path) -> None:

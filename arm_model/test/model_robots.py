@@ -53,6 +53,7 @@ def forward(root: ET.Element, angles: Mapping[str, float], tip: str) -> Matrix:
 FOLDER = Path(__file__).parents[2] / 'arm_bringup' / 'robots'
 
 ROBOTS = ('panda', 'prbt', 'gp110')
+LIMITS = {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0}
 
 # the straight pose of each arm, where it is singular; Panda's fourth joint does not reach zero
 STRAIGHT: Mapping[str, Array] = {
@@ -94,31 +95,34 @@ def chain_texts(kinds: str) -> tuple[str, str, dict[str, Any]]:
         kinds: One letter per joint: x, y or z for a revolute joint about it, c for a continuous
             joint about z, p for a sliding one along x.
     """
-    parts = ['<robot name="chain"><link name="base"/>']
-    for number, kind in enumerate(kinds):
-        parent = f'link_{number}' if number else 'base'
-        axis = {'x': '1 0 0', 'y': '0 1 0', 'p': '1 0 0'}.get(kind, '0 0 1')
-        sort = {'c': 'continuous', 'p': 'prismatic'}.get(kind, 'revolute')
+    parts, parent = ['<link name="base"/>'], 'base'
+    for number, kind in enumerate(kinds, 1):
+        axis, sort = _axis_and_type(kind)
+        link = f'link_{number}'
         parts.append(
-            f'<link name="link_{number + 1}"><collision><origin xyz="0 0 0.05"/><geometry>'
+            f'<link name="{link}"><collision><origin xyz="0 0 0.05"/><geometry>'
             f'<sphere radius="0.03"/></geometry></collision></link>'
-            f'<joint name="j{number + 1}" type="{sort}"><origin xyz="0.05 0 0.2"/>'
-            f'<parent link="{parent}"/><child link="link_{number + 1}"/><axis xyz="{axis}"/>'
+            f'<joint name="j{number}" type="{sort}"><origin xyz="0.05 0 0.2"/>'
+            f'<parent link="{parent}"/><child link="{link}"/><axis xyz="{axis}"/>'
             f'<limit lower="-2" upper="2" velocity="2" effort="1"/></joint>'
         )
+        parent = link
     parts.append(
         '<link name="tip"/><joint name="end" type="fixed"><origin xyz="0.1 0 0.15"/>'
-        f'<parent link="link_{len(kinds)}"/><child link="tip"/></joint></robot>'
+        f'<parent link="{parent}"/><child link="tip"/></joint>'
     )
-    names = [f'j{number + 1}' for number in range(len(kinds))]
     srdf = (
         '<robot name="chain"><group name="arm">'
         '<chain base_link="base" tip_link="tip"/></group></robot>'
     )
-    limits = {
-        name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names
-    }
-    return ''.join(parts), srdf, limits
+    limits = {f'j{number}': dict(LIMITS) for number in range(1, len(kinds) + 1)}
+    return f'<robot name="chain">{"".join(parts)}</robot>', srdf, limits
+
+
+def _axis_and_type(kind: str) -> tuple[str, str]:
+    """Return axis and type of a joint by its letter."""
+    axis = {'x': '1 0 0', 'y': '0 1 0', 'p': '1 0 0'}.get(kind, '0 0 1')
+    return axis, {'c': 'continuous', 'p': 'prismatic'}.get(kind, 'revolute')
 
 
 @cache
@@ -145,36 +149,27 @@ def two_arms(group: str = 'both', tip: str | None = None) -> RobotModel:
 def two_arms_texts() -> tuple[str, str, dict[str, dict[str, float]]]:
     """Return URDF, SRDF and limits of :func:`two_arms`."""
     sphere = '<collision><geometry><sphere radius="0.04"/></geometry></collision>'
-    parts = [
-        f'<robot name="two_arms"><link name="base">{sphere}</link>',
-        _joint('torso', 'z', 'base', '0 0 0.2'),
-    ]
+    parts = [f'<link name="base">{sphere}</link>', _joint('torso', 'z', 'base', '0 0 0.2')]
+    names, groups = ['torso'], ''
     for side, kinds in ARM_KINDS.items():
         parent, y = 'torso_link', 0.15 if side == 'left' else -0.15
         for number, kind in enumerate(kinds):
-            name = f'{side}_{number + 1}'
-            parts.append(_joint(name, kind, parent, f'0.05 {y} 0.1'))
-            parent, y = f'{name}_link', 0.0
-    chains = {side: f'{side}_{len(kinds)}_link' for side, kinds in ARM_KINDS.items()}
-    groups = ''.join(
-        f'<group name="{side}"><chain base_link="torso_link" tip_link="{end}"/></group>'
-        for side, end in chains.items()
-    )
+            names.append(f'{side}_{number + 1}')
+            parts.append(_joint(names[-1], kind, parent, f'0.05 {y} 0.1'))
+            parent, y = f'{names[-1]}_link', 0.0
+        chain = f'<chain base_link="torso_link" tip_link="{parent}"/>'
+        groups += f'<group name="{side}">{chain}</group>'
     srdf = (
         f'<robot name="two_arms">{groups}<group name="both"><chain base_link="base"'
         ' tip_link="torso_link"/><group name="left"/><group name="right"/></group></robot>'
     )
-    names = ['torso', *(f'{side}_{n + 1}' for side, k in ARM_KINDS.items() for n in range(len(k)))]
-    limits = {
-        name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names
-    }
-    return ''.join([*parts, '</robot>']), srdf, limits
+    limits = {name: dict(LIMITS) for name in names}
+    return f'<robot name="two_arms">{"".join(parts)}</robot>', srdf, limits
 
 
 def _joint(name: str, kind: str, parent: str, xyz: str) -> str:
     """Return a joint by its letter, and the link with a sphere that it moves."""
-    axis = {'y': '0 1 0', 'p': '1 0 0'}.get(kind, '0 0 1')
-    sort = {'c': 'continuous', 'p': 'prismatic'}.get(kind, 'revolute')
+    axis, sort = _axis_and_type(kind)
     return (
         f'<link name="{name}_link"><collision><origin xyz="0.05 0 0"/><geometry>'
         f'<sphere radius="0.03"/></geometry></collision></link>'

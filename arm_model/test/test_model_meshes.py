@@ -321,7 +321,7 @@ def test_links_without_a_shape_are_named() -> None:
 
 def _hollow(folder: Path, scales: Sequence[float], name: str) -> None:
     """Write boxes in boxes as OBJ: each fills little of its hull, and is closed."""
-    corners, faces = [], []
+    corners, faces = list[tuple[float, float, float]](), list[list[int]]()
     for place, scale in enumerate(scales):
         for each, step in ((scale, 1), (0.9 * scale, -1)):
             faces += [[len(corners) + corner for corner in face[::step]] for face in TRIANGLES]

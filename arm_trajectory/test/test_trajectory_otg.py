@@ -100,23 +100,20 @@ def test_the_extremes_of_a_stop_are_those_of_its_places(seed: int) -> None:
 
 
 def test_a_plan_to_a_state_arrives() -> None:
-    """Position, velocity and acceleration of the target are met at the end."""
-    limits = robot('prbt').limits
+    """Position, velocity and acceleration of the target are met at the end.
+
+    A target that ruckig refuses is no exception in the loop.
+    """
+    generator = OnlineTrajectoryGenerator(robot('prbt').limits)
     start = RobotState(np.zeros(6), np.full(6, 0.2), np.full(6, 0.5))
     target = RobotState(np.full(6, 0.7), np.full(6, -0.3), np.full(6, 0.1))
-    plan = OnlineTrajectoryGenerator(limits).to_state(start, target)
+    plan = generator.to_state(start, target)
     assert plan is not None
     end = plan.at(plan.duration)
     assert end.position == pytest.approx(target.position, abs=1e-9)
     assert end.velocity == pytest.approx(target.velocity, abs=1e-9)
     assert end.acceleration == pytest.approx(target.acceleration, abs=1e-6)
-
-
-def test_ruckig_without_an_answer_is_none() -> None:
-    """A target that ruckig refuses is no exception in the loop."""
-    limits = robot('prbt').limits
-    state = RobotState.at_rest(np.zeros(6))
-    assert OnlineTrajectoryGenerator(limits).to_velocity(state, np.full(6, np.nan)) is None
+    assert generator.to_velocity(start, np.full(6, np.nan)) is None
 
 
 def test_the_hard_brake_comes_to_rest() -> None:
