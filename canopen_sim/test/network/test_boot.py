@@ -151,6 +151,22 @@ class Scene:
         self.net.run(duration)
 
 
+CONFIGURATION = [
+    (0x1017, 0, 100),
+    # RPDO 1 was valid
+    *((0x1400, 1, INVALID | 0x200 + NODE_ID), (0x1400, 2, 255)),
+    *((0x1600, 0, 0), (0x1600, 1, 0x6040_0010), (0x1600, 2, 0x6060_0008), (0x1600, 0, 2)),
+    (0x1400, 1, 0x205),
+    # RPDO 2 is to be off, and is
+    # TPDO 1 of a device that knows no remote frames
+    *((0x1800, 1, INVALID | 0x4000_0180 + NODE_ID), (0x1800, 2, 1)),
+    *((0x1800, 3, 15), (0x1800, 5, 100), (0x1800, 6, 3)),
+    *((0x1A00, 0, 0), (0x1A00, 1, 0x6041_0010), (0x1A00, 2, 0x6064_0020), (0x1A00, 0, 2)),
+    (0x1800, 1, 0x4000_0185),
+    *((0x6081, 0, 500), (0x6098, 0, 0xFF)),
+]
+
+
 def test_the_whole_configuration_in_its_order() -> None:
     """Error control, each PDO disabled, set, mapped and enabled, the list of bus.yml, start.
 
@@ -158,31 +174,7 @@ def test_the_whole_configuration_in_its_order() -> None:
     """
     scene = Scene()
     scene.boot()
-    assert scene.device.writes == [
-        (0x1017, 0, 100),
-        # RPDO 1 was valid
-        (0x1400, 1, INVALID | 0x200 + NODE_ID),
-        (0x1400, 2, 255),
-        (0x1600, 0, 0),
-        (0x1600, 1, 0x6040_0010),
-        (0x1600, 2, 0x6060_0008),
-        (0x1600, 0, 2),
-        (0x1400, 1, 0x205),
-        # RPDO 2 is to be off, and is
-        # TPDO 1 of a device that knows no remote frames
-        (0x1800, 1, INVALID | 0x4000_0180 + NODE_ID),
-        (0x1800, 2, 1),
-        (0x1800, 3, 15),
-        (0x1800, 5, 100),
-        (0x1800, 6, 3),
-        (0x1A00, 0, 0),
-        (0x1A00, 1, 0x6041_0010),
-        (0x1A00, 2, 0x6064_0020),
-        (0x1A00, 0, 2),
-        (0x1800, 1, 0x4000_0185),
-        (0x6081, 0, 500),
-        (0x6098, 0, 0xFF),
-    ]
+    assert scene.device.writes == CONFIGURATION
     scene.run(1.0)
     assert scene.device.commands == [RESET_COMMUNICATION, PRE_OPERATIONAL, START]
     assert scene.device.state is NmtState.OPERATIONAL
@@ -507,38 +499,27 @@ def test_a_value_that_the_device_has_is_no_reason_to_fail(
 
 
 CONFIGURED = {
-    (0x1400, 1): 0x205,
-    (0x1400, 2): 255,
-    (0x1600, 0): 2,
-    (0x1600, 1): 0x6040_0010,
-    (0x1600, 2): 0x6060_0008,
-    (0x1401, 1): 0x8000_0305,
-    (0x1800, 1): 0x4000_0185,
-    (0x1800, 2): 1,
-    (0x1800, 3): 15,
-    (0x1800, 5): 100,
-    (0x1800, 6): 3,
-    (0x1A00, 0): 2,
-    (0x1A00, 1): 0x6041_0010,
-    (0x1A00, 2): 0x6064_0020,
+    (index, subindex): value
+    for index, subindex, value in (*CONFIGURATION, (0x1401, 1, INVALID | 0x305))
+    if 0x1400 <= index < 0x1C00
 }
 """The PDO objects of a device that has been configured before."""
 
 COMMANDED = {(0x6040, 0): 0x000F, (0x6060, 0): 8}
 
 
-def running(**changes: object) -> tuple[Scene, ScriptedDevice]:
+def running(**changes: object) -> Scene:
     """Return a network whose device has been configured and started by another master."""
     scene = Scene(io_config(**changes))
-    device = scene.device
-    device.values |= object_bytes({**COMMANDED, **CONFIGURED})
-    device.state, device.guarded = NmtState.OPERATIONAL, True
-    return scene, device
+    scene.device.values |= object_bytes({**COMMANDED, **CONFIGURED})
+    scene.device.state, scene.device.guarded = NmtState.OPERATIONAL, True
+    return scene
 
 
 def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     """No NMT command, no PDO object written; an RPDO carries what the device has beside."""
-    network, device = running(reset_communication=False)
+    network = running(reset_communication=False)
+    device = network.device
     network.start(1.0)
     node = network.node
     assert node.online
@@ -558,7 +539,8 @@ NO_STATE = ('boot error K: no heartbeat', 'does not send its NMT state', 'once, 
 @pytest.mark.parametrize('words', [OTHER_PDOS, NO_STATE], ids=['other PDOs', 'no NMT state'])
 def test_a_device_that_may_run_otherwise_is_left_alone(words: tuple[str, ...]) -> None:
     """Nothing is sent that could disturb it; reason and remedy are reported, and a reset helps."""
-    network, device = running(reset_communication=False)
+    network = running(reset_communication=False)
+    device = network.device
     if words is OTHER_PDOS:
         device.values[0x1A00, 2] = (0x606C_0020).to_bytes(4, 'little')
     else:
@@ -581,7 +563,8 @@ def test_a_device_that_does_not_run_is_configured_where_the_master_may(
     key: str, commands: list[int]
 ) -> None:
     """Kept alive it is not reset; with `boot: false` it is taken as it is, whatever its state."""
-    network, device = running(**{key: False})
+    network = running(**{key: False})
+    device = network.device
     device.state = NmtState.PRE_OPERATIONAL
     network.start(2.0)
     assert device.commands == commands
