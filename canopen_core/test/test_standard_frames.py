@@ -12,7 +12,6 @@ import pytest
 
 from canopen_core import CodecError
 from canopen_core.standard import (
-    abort_text,
     AbortCode,
     DataType,
     FIXED_BITS,
@@ -150,13 +149,6 @@ def test_what_no_frame_carries_is_refused() -> None:
                 decode(frame)
     message = sdo.decode_request(bytes.fromhex('22 40 60 00 0F 00 00 00'))
     assert message == sdo.DownloadRequest(0x6040, 0, b'\x0f\x00\x00\x00', None)
-
-
-def test_every_abort_code_has_a_text_of_its_own() -> None:
-    """No code is without words, and no two share them."""
-    assert len({code.text for code in AbortCode}) == len(AbortCode)
-    assert '0x06020000' in abort_text(AbortCode.NO_OBJECT)
-    assert 'unknown' in abort_text(0x1234_5678)
 
 
 MAPPABLE = sorted(FIXED_BITS)

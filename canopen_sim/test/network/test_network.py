@@ -180,27 +180,23 @@ def test_a_state_that_somebody_commanded_is_left_alone() -> None:
         assert events(net, EventKind.NMT_STATE) == [stopped, 'NMT state OPERATIONAL']
 
 
-@pytest.mark.parametrize(
-    ('overflow', 'counters'),
-    [(0, [b''] * 8), (5, [b'\1', b'\2', b'\3', b'\4', b'\5', b'\1', b'\2', b'\3'])],
-)
-def test_sync_counts_as_the_standard_says(overflow: int, counters: list[bytes]) -> None:
+def test_sync_counts_as_the_standard_says() -> None:
     """With an overflow value from 1 to it, without one no data (CiA 301, 7.2.5).
 
     It begins anew where its producer leaves Stopped, and nowhere else.
     """
-    net = network(sync_overflow=overflow)
-    net.start()
-    net.run(7.5 * PERIOD)
-    assert net.frames(SYNC) == counters
-    for command in (NmtCommand.STOP, NmtCommand.START):
-        net.network.send_nmt(command, net.network.config.master.node_id)
-    net.run(2 * PERIOD)
-    assert net.frames(SYNC) == counters + counters[:2]
-    for command in (NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.START):
-        net.network.send_nmt(command, net.network.config.master.node_id)
-    net.run(2 * PERIOD)
-    assert net.frames(SYNC) == counters + counters[:4]
+    for overflow in (0, 5):
+        counters = [bytes((n % 5 + 1,)) if overflow else b'' for n in range(8)]
+        net = network(sync_overflow=overflow)
+        net.start()
+        net.run(7.5 * PERIOD)
+        assert net.frames(SYNC) == counters
+        leaves = (NmtCommand.STOP, counters[:2]), (NmtCommand.ENTER_PRE_OPERATIONAL, counters[:4])
+        for command, anew in leaves:
+            for each in (command, NmtCommand.START):
+                net.network.send_nmt(each, net.network.config.master.node_id)
+            net.run(2 * PERIOD)
+            assert net.frames(SYNC) == counters + anew
 
 
 def test_without_sync_the_cycle_goes_on() -> None:
@@ -413,23 +409,18 @@ def test_a_time_out_that_begins_with_a_frame_counts_from_it() -> None:
     assert net.network.scheduler.next_deadline() == pytest.approx(begin + 0.52)
 
 
-@pytest.mark.parametrize(
-    ('frame', 'what'),
-    [(Frame(0x80), 'SYNC'), (Frame(0x701, b'\x05'), 'the heartbeat 0x701')],
-    ids=['sync', 'heartbeat'],
-)
-def test_another_master_is_noticed(frame: Frame, what: str) -> None:
+def test_another_master_is_noticed() -> None:
     """It is said once what only the master of a bus sends."""
     net = network('a')
     net.boot()
-    for _ in range(5):
-        net.send_as('other_master', frame)
-        net.run(0.01)
-    said = [
-        text for text in net.reported(Severity.ERROR) if 'another master is on this bus' in text
-    ]
-    assert len(said) == 1
-    assert what in said[0]
+    for frame, what in ((Frame(SYNC), 'SYNC'), (Frame(0x701, b'\x05'), 'the heartbeat 0x701')):
+        net.events.clear()
+        for _ in range(5):
+            net.send_as('other_master', frame)
+            net.run(0.01)
+        errors = net.reported(Severity.ERROR)
+        (said,) = [text for text in errors if 'another master is on this bus' in text]
+        assert what in said
 
 
 def test_a_device_that_does_not_answer_sync_is_reported_before_its_heartbeat_is_missed() -> None:
@@ -448,19 +439,6 @@ def test_a_device_that_does_not_answer_sync_is_reported_before_its_heartbeat_is_
         net.lose()
         net.run(0.2)
         assert net.drives['a'].view.fresh
-
-
-def test_pauses_of_a_busy_computer_are_summed_up() -> None:
-    """A line for each would bury what matters: what devices took for the end of the master."""
-    net = VirtualNetwork(bus_config(drive_config('a', 2), heartbeat_timeout=0.3))
-    for number in range(50):
-        net.network.note_pause(0.12 + number * 1e-3, 0.5 * number)
-    lines = net.reported(Severity.WARNING)
-    assert len(lines) == 3
-    assert 'held up for 160 ms by this computer, and 19 times before, for 159 ms' in lines[-1]
-    assert 'taken it for dead' not in str(lines)
-    net.network.note_pause(0.6, 25.0)
-    assert 'taken it for dead' in net.reported(Severity.WARNING)[-1]
 
 
 CONTROLLER = 0x204  # a controller problem, with counters
@@ -623,7 +601,7 @@ def test_a_flood_of_emergencies_is_reported_once_with_its_number() -> None:
     """Others are reported at once meanwhile, and the same one again when the flood was over."""
     net = booted(drive_config('a', 2))
     device, node = net.devices['a'], net.network.nodes['a']
-    flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.002)
+    flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.01)
 
     def reported(severity: Severity) -> list[str]:
         found = (event for event in net.events if event.kind is EventKind.EMERGENCY)
@@ -640,7 +618,7 @@ def test_a_flood_of_emergencies_is_reported_once_with_its_number() -> None:
     assert [text[:12] for text in reported(Severity.ERROR)] == errors
     counts = reported(Severity.WARNING)
     assert len(counts) == 2, counts
-    assert re.match(r'EMCY: 5\d\d\d more in 10 s \(2\d\d\d x 0x\w{4} ', counts[0]), counts
+    assert re.match(r'EMCY: (9|1\d)\d\d more in 10 s \([45]\d\d x 0x\w{4} ', counts[0]), counts
     assert len(node.emergencies.history) == len(errors)
     assert len(node_status(node, net.now).emergencies) == len(node.emergencies.history)
 
@@ -884,30 +862,13 @@ def test_a_start_that_waits_is_withdrawn_when_its_device_restarts() -> None:
 
 
 @pytest.mark.parametrize('inhibit_time', [0.0, 0.05])
-def test_a_defect_at_one_command_keeps_back_no_other(
-    inhibit_time: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A stop by NMT must leave, whatever went wrong before."""
-    net = seven_drives(inhibit_time)
-    net.allows_defects = True
-    net.boot()
-    with monkeypatch.context() as patch:
-        patch.setattr(net.network._nmt, '_send', None)
-        net.network.send_nmt(NmtCommand.STOP, 2)
-        net.run(0.2)
-    assert sent_at(net, NmtCommand.STOP, 2) == []
-    net.network.send_nmt(NmtCommand.STOP, 3)
-    net.run(0.2)
-    assert len(sent_at(net, NmtCommand.STOP, 3)) == 1
-
-
-@pytest.mark.parametrize('inhibit_time', [0.0, 0.05])
 def test_a_command_that_the_bus_refuses_leaves_as_soon_as_the_bus_takes_it(
-    inhibit_time: float,
+    inhibit_time: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is not done before, keeps its place, and counts as commanded when it has left.
 
-    One that the bus never takes is answered so, and does not leave later.
+    One that the bus never takes is answered so, and does not leave later. A stop must leave,
+    whatever went wrong before: a defect at one command keeps back no other.
     """
     net = seven_drives(inhibit_time)
     net.boot()
@@ -928,6 +889,15 @@ def test_a_command_that_the_bus_refuses_leaves_as_soon_as_the_bus_takes_it(
     net.wire.refuses = ''
     net.run(0.2)
     assert len(nmt_commands(net)) == before
+    net.allows_defects = True
+    with monkeypatch.context() as patch:
+        patch.setattr(net.network._nmt, '_send', None)
+        net.network.send_nmt(NmtCommand.STOP, 3)
+        net.run(0.2)
+    assert sent_at(net, NmtCommand.STOP, 3) == []
+    net.network.send_nmt(NmtCommand.STOP, 4)
+    net.run(0.2)
+    assert len(sent_at(net, NmtCommand.STOP, 4)) == 1
 
 
 BUS = bus_config(drive_config('a', 2), drive_config('b', 3))
