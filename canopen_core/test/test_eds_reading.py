@@ -203,8 +203,14 @@ def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
     assert names == ['NrOfObjects', 'Field1', 'Second']
 
 
-def test_the_node_id_of_a_dcf(tmp_path: Path) -> None:
-    """A DCF gives the node id, under either spelling; an invalid one does not count."""
+OBJECT = '\n[1000]\nDataType=7\nAccessType=ro'
+
+
+def test_sections_beside_the_objects(tmp_path: Path) -> None:
+    """A DCF gives the node id, under either spelling; an invalid one does not count.
+
+    In PDOs only the gaps that the device takes are allowed; without that section, all.
+    """
     for section, node_id in (
         ('[DeviceComissioning]\nNodeID=0x05', 5),
         ('[DeviceCommissioning]\nNodeID=7', 7),
@@ -212,16 +218,10 @@ def test_the_node_id_of_a_dcf(tmp_path: Path) -> None:
         ('[DeviceComissioning]\nNodeID=200', None),
         ('', None),
     ):
-        eds = read(tmp_path, f'{section}\n[1000]\nDataType=7\nAccessType=ro')
-        assert eds.node_id == node_id, section
-
-
-def test_dummy_usage(tmp_path: Path) -> None:
-    """Only the gaps that the device takes are allowed; a file without the section allows all."""
-    objects = '\n[1000]\nDataType=7\nAccessType=ro'
-    assert read(tmp_path, objects).dummy_types == set(range(2, 8))
+        assert read(tmp_path, section + OBJECT).node_id == node_id, section
+    assert read(tmp_path, OBJECT).dummy_types == set(range(2, 8))
     text = '[DummyUsage]\nDummy0001=1\nDummy0002=0\nDummy0005=1\nDummy0006=\nDummy0007=0x1'
-    assert read(tmp_path, text + objects).dummy_types == {5, 7}
+    assert read(tmp_path, text + OBJECT).dummy_types == {5, 7}
 
 
 def test_files_that_are_no_eds_are_refused(tmp_path: Path) -> None:

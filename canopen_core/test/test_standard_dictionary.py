@@ -149,23 +149,19 @@ def dictionary() -> ObjectDictionary:
     return load_eds(EDS).dictionary
 
 
-def test_every_object_is_found_by_number(dictionary: ObjectDictionary) -> None:
-    """With and without 0x, in upper and lower case."""
+def test_every_object_is_found_by_its_number_and_by_its_path(dictionary: ObjectDictionary) -> None:
+    """With and without 0x, in upper and lower case.
+
+    Only where the EDS has two objects of one name the number is needed, and both are named.
+    """
+    paths = [object_path(entry).lower() for entry in dictionary]
     for entry in dictionary:
-        for path in (
+        for number in (
             f'0x{entry.index:04X}:{entry.subindex:02X}',
             f'{entry.index:04x}:{entry.subindex:x}',
             f' 0X{entry.index:04x}:0x{entry.subindex:02x} ',
         ):
-            assert find_object(dictionary, path) is entry
-
-
-def test_every_object_is_found_by_its_path_or_its_doubles_are_named(
-    dictionary: ObjectDictionary,
-) -> None:
-    """Only where the EDS has two objects of one name the number is needed."""
-    paths = [object_path(entry).lower() for entry in dictionary]
-    for entry in dictionary:
+            assert find_object(dictionary, number) is entry
         path = object_path(entry)
         if paths.count(path.lower()) == 1:
             assert find_object(dictionary, path.upper()) is entry

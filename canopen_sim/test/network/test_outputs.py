@@ -71,17 +71,15 @@ def publish(net: VirtualNetwork, place: tuple[int, int], value: int) -> None:
     net.network.publish_objects(net.network.nodes[MODULE], {place: value})
 
 
-def test_nothing_leaves_before_somebody_publishes() -> None:
-    """The outputs of a module are not forced to a default by the start of a master."""
+def test_what_is_published_leaves_once() -> None:
+    """Two values are two frames at once: no edge is lost; before a SYNC the last one counts.
+
+    Before that nothing leaves: a master that starts forces the outputs to no default.
+    """
     net = booted(outputs=0x2A)
     net.run(1.0)
     assert net.frames(COB_ID) == net.frames(SYNC_COB_ID) == []
     assert read(net, OUTPUTS) == 0x2A
-
-
-def test_what_is_published_leaves_once() -> None:
-    """Two values are two frames at once: no edge is lost; before a SYNC the last one counts."""
-    net = booted()
     for target, values in ((OUTPUTS, (1, 0)), ((0x6071, 0), (5, -7))):
         for value in values:
             publish(net, target, value)

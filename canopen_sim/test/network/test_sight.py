@@ -414,33 +414,50 @@ UNNOTICED = pytest.mark.parametrize(
 def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     config: NodeConfig, mode: OperationMode
 ) -> None:
-    """Where nothing shows that it is old, the drive is stopped by its own ramp, and disabled."""
+    """Where nothing shows that it is old, the drive is stopped by its own ramp, and disabled.
+
+    Its position is read before it is enabled: the motor does not go back to the last that came.
+    """
     led = Led(mode, Leader(), config)
     (warning,) = [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
     assert 'TPDO 1, 2' in warning
     led.net.lose(*TPDOS)
+    shown = led.net.motor()
     velocities = led.velocities()
     assert min(velocities) > -0.02
     assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
-    led.net.run(5.0)
+    led.net.run(8.0)
     assert led.net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    rest = led.net.motor()
+    assert abs(rest - shown) > 0.05
+    led.net.lose()
+    led.net.do(JOINT, 'enable')
+    assert max(map(abs, led.velocities(1.0))) < 0.02
+    assert led.net.motor() == pytest.approx(rest, abs=1e-3)
 
 
-@pytest.mark.parametrize('verb', ['enable', 'recover', 'init'])
 @UNNOTICED
-def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(
-    config: NodeConfig, verb: str
-) -> None:
-    """Else it would count as enabled for good, by the last TPDO that came."""
+def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(config: NodeConfig) -> None:
+    """Else it would count as enabled for good, by the last TPDO that came.
+
+    A fault is named by enable, and reset at once by recover.
+    """
     net = enabled(config, OperationMode.PROFILE_POSITION)
-    net.lose(*TPDOS)
-    net.devices[JOINT].faults.inject(FaultInjection(Fault.STO, duration=0.5), net.now)
+    for verb in ('enable', 'recover', 'init'):
+        net.lose(*TPDOS)
+        net.devices[JOINT].faults.inject(FaultInjection(Fault.STO, duration=0.5), net.now)
+        net.run(1.0)
+        assert net.simulated().state is not DriveState.OPERATION_ENABLED
+        net.lose()
+        assert 'Operation enabled' in net.do(JOINT, verb), verb
+        assert net.simulated().state is DriveState.OPERATION_ENABLED
+    net.lose(*TPDOS, 0x080 + NODE_ID)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.OVER_CURRENT), net.now)
     net.run(1.0)
-    assert net.simulated().state is not DriveState.OPERATION_ENABLED
     net.lose()
-    answer = net.do(JOINT, verb)
-    assert 'Operation enabled' in answer
-    assert net.simulated().state is DriveState.OPERATION_ENABLED
+    with pytest.raises(DriveError, match='is faulted; recover it first'):
+        net.do(JOINT, 'enable')
+    assert 'Operation enabled' in net.do(JOINT, 'recover')
 
 
 @pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'shutdown'])
@@ -475,38 +492,6 @@ def test_a_stop_that_cannot_be_seen_at_all_is_not_answered_as_one(config: NodeCo
     net.run_until(lambda: halt.done, 20.0)
     with pytest.raises(DriveError, match='standstill'):
         halt.result()
-
-
-@UNNOTICED
-def test_a_fault_that_got_lost_is_reset_at_once(config: NodeConfig) -> None:
-    """By recover and init; enable names it."""
-    net = enabled(config, OperationMode.PROFILE_POSITION)
-    net.lose(*TPDOS, 0x080 + NODE_ID)
-    net.devices[JOINT].faults.inject(FaultInjection(Fault.OVER_CURRENT), net.now)
-    net.run(1.0)
-    net.lose()
-    assert net.simulated().state is DriveState.FAULT
-    with pytest.raises(DriveError, match='is faulted; recover it first'):
-        net.do(JOINT, 'enable')
-    assert 'Operation enabled' in net.do(JOINT, 'recover')
-
-
-@STREAMED
-@UNNOTICED
-def test_a_drive_that_moved_unseen_is_enabled_where_it_is(
-    config: NodeConfig, mode: OperationMode
-) -> None:
-    """Its position is read, too, and the motor does not go back to the last one that came."""
-    led = Led(mode, Leader(), config)
-    led.net.lose(*TPDOS)
-    shown = led.net.motor()
-    led.net.run(10.0)
-    rest = led.net.motor()
-    assert abs(rest - shown) > 0.05
-    led.net.lose()
-    led.net.do(JOINT, 'enable')
-    assert max(map(abs, led.velocities(1.0))) < 0.02
-    assert led.net.motor() == pytest.approx(rest, abs=1e-3)
 
 
 def test_a_device_that_refuses_its_event_timer_is_named_until_it_takes_it() -> None:
