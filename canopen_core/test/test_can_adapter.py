@@ -194,7 +194,7 @@ def test_a_serial_adapter_that_fails_is_said_to_and_used_again(
     it reads again.
     """
     with open_bus(serial_adapter.name) as bus:
-        deadline = monotonic() + 20.0
+        deadline = monotonic() + 3 * DEADLINE
         for damaged in LINES:
             serial_adapter.write(b't1811AA', damaged, b't1821BB')
         frames = receive(bus, 2 * len(LINES), deadline)
