@@ -108,9 +108,7 @@ def recorded(
 
 @pytest.mark.xdist_group('replayed_robot')
 @pytest.mark.slow
-def test_the_states_of_a_log_are_those_of_the_robot(
-    recorded: tuple[Protocol, Path, Seen],
-) -> None:
+def test_the_states_of_a_log_are_those_of_the_robot(recorded: tuple[Protocol, Path, Seen]) -> None:
     """Measured values are the same; what needs times is as near as the times are."""
     _, log, live = recorded
     replayed = recorded_in(log, URDF, imu_checked=True)

@@ -31,10 +31,7 @@ from quad_hardware import CommandError
 from quad_hardware.calibration import odometry
 from quad_hardware.calibration.main import read_parameters, run_calibrate, write_parameters
 from quad_hardware.calibration.odometry import Place, way
-from quad_hardware.calibration.wizard import (
-    MIN_TURN,
-    with_direction,
-)
+from quad_hardware.calibration.wizard import MIN_TURN, with_direction
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2
 from quad_pty_peer import PtyPeer, Script
@@ -183,9 +180,7 @@ KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
 
 @pytest.mark.slow
 @given(
-    st.sampled_from([1, -1]),
-    st.floats(-1.0, 1.0),
-    st.floats(math.radians(MIN_TURN) + 0.01, 1.5),
+    st.sampled_from([1, -1]), st.floats(-1.0, 1.0), st.floats(math.radians(MIN_TURN) + 0.01, 1.5)
 )
 def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> None:
     """From two angles of a servo that is mounted in any way."""

@@ -317,9 +317,7 @@ def test_a_dead_imu_is_no_reason_to_refuse_the_joints(
 def test_a_motor_that_is_not_fitted_may_report_anything(angle: float, speed: float) -> None:
     """The slots of an arm that is not there are nobody's; on a robot that has one they count."""
     garbage = replace(
-        STATE,
-        positions={**STATE.positions, 54: angle},
-        velocities={**STATE.velocities, 52: speed},
+        STATE, positions={**STATE.positions, 54: angle}, velocities={**STATE.velocities, 52: speed}
     )
     plausibility = Plausibility(LEG_MOTORS)
     assert [plausibility.check(state) for state in (STATE, garbage, STATE)] == [''] * 3

@@ -48,7 +48,6 @@ class Rig:
         self.changes: list[tuple[LinkState, str]] = []
         self.reports_at: list[int] = []
         self.driver = Driver(LinkOptions(str(port)), self._take, self._enter)
-        self._is_stopped = False
 
     def _take(self, state: Report) -> str:
         reason = self.on_state(state)
@@ -78,12 +77,6 @@ class Rig:
         wait_for(lambda: len(self.states) >= until, f'{count} reports')
         self.reach(LinkState.RUNNING)
 
-    def stop(self) -> None:
-        """Stop the driver."""
-        if not self._is_stopped:
-            self._is_stopped = True
-            self.driver.stop()
-
     def __enter__(self) -> Self:
         """Start the driver."""
         self.driver.start()
@@ -91,7 +84,7 @@ class Rig:
 
     def __exit__(self, *_error: object) -> None:
         """Stop it."""
-        self.stop()
+        self.driver.stop()
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:

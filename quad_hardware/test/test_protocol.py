@@ -11,7 +11,7 @@ from collections.abc import Callable
 import math
 import struct
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
@@ -219,6 +219,7 @@ STATE_WIRE = state_frame(sequence=7).encode(V2)
 CUT_SHORT = (b'\x55', b'\x55\x00', b'\x55\x00\xfe', b'\x55\x00\xfe\x12', b'\x55' * 9)
 
 
+@settings(max_examples=40)
 @given(st.data(), PROTOCOLS)
 def test_no_valid_frame_is_lost(data: st.DataObject, protocol: Protocol) -> None:
     """Whatever came before, and wherever it is cut: each is found, in order.

@@ -21,12 +21,7 @@ from operator_input import OperatorInputError
 from quad_msgs.srv import SetMode
 from quad_teleop import Mode, TeleopError
 from quad_teleop.motion import RobotRequest
-from quad_teleop.nodes.teleop import (
-    DISCOVERY_TIMEOUT,
-    RobotLink,
-    TeleopGamepad,
-    TeleopKeyboard,
-)
+from quad_teleop.nodes.teleop import DISCOVERY_TIMEOUT, RobotLink, TeleopGamepad, TeleopKeyboard
 from quad_teleop.nodes.twist_mux import TwistMux
 
 

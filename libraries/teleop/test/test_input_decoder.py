@@ -21,68 +21,41 @@ def decode(text: str, *, kitty: bool = False) -> list[tuple[str, KeyAction]]:
     return [(event.key, event.action) for event in events if isinstance(event, KeyEvent)]
 
 
-@pytest.mark.parametrize(
-    ('text', 'name'),
-    [
-        ('i', 'i'),
-        ('I', 'I'),
-        ('<', '<'),
-        (' ', 'space'),
-        ('\r', 'enter'),
-        ('\t', 'tab'),
-        ('\x7f', 'backspace'),
-        ('\x03', 'ctrl+c'),
-        ('\x1a', 'ctrl+z'),
-        ('\x1c', 'ctrl+\\'),
-        ('\x1bi', 'alt+i'),
-        ('\x1b[A', 'up'),
-        ('\x1bOB', 'down'),
-        ('\x1b[5~', 'page_up'),
-        ('\x1b[6~', 'page_down'),
-        ('\x1b[1~', 'home'),
-        ('\x1b[H', 'home'),
-        ('\x1bOP', 'f1'),
-        ('\x1b[15~', 'f5'),
-        ('\x1b[17~', 'f6'),
-        ('\x1b[24~', 'f12'),
-        ('\x1b[1;5C', 'ctrl+right'),
-        ('\x1b[27;5;105~', 'ctrl+i'),
-        ('\x1b[105;5u', 'ctrl+i'),
-        ('ш', 'ш'),
-    ],
-)
+OLD = {
+    'i': 'i', 'I': 'I', '<': '<', ' ': 'space', 'ш': 'ш', '\x1bi': 'alt+i',
+    '\r': 'enter', '\t': 'tab', '\x7f': 'backspace',
+    '\x03': 'ctrl+c', '\x1a': 'ctrl+z', '\x1c': 'ctrl+\\',
+    # of xterm, the VT220 and modifyOtherKeys
+    '\x1b[A': 'up', '\x1bOB': 'down', '\x1b[5~': 'page_up', '\x1b[6~': 'page_down',
+    '\x1b[1~': 'home', '\x1b[H': 'home',
+    '\x1bOP': 'f1', '\x1b[15~': 'f5', '\x1b[17~': 'f6', '\x1b[24~': 'f12',
+    '\x1b[1;5C': 'ctrl+right', '\x1b[27;5;105~': 'ctrl+i', '\x1b[105;5u': 'ctrl+i',
+}  # fmt: skip
+KITTY = {
+    # with and without the optional parts of the protocol
+    '\x1b[105u': 'i', '\x1b[105;;105u': 'i', '\x1b[105;1:1;105u': 'i',
+    '\x1b[105:73;2:1;73u': 'I', '\x1b[44:60;2:1;60u': '<', '\x1b[44:60;2u': '<',
+    '\x1b[32;1:1;32u': 'space', '\x1b[13u': 'enter', '\x1b[27u': 'escape', '\x1b[99;5u': 'ctrl+c',
+    # other layouts
+    '\x1b[1089::99;5u': 'ctrl+c', '\x1b[1096::105;1:1;1096u': 'i',
+    '\x1b[1096:1064:105;2:1;1064u': 'I',
+    # Caps Lock and Num Lock
+    '\x1b[105;65:1;73u': 'I', '\x1b[105;129:1;105u': 'i',
+    # function keys and the keypad
+    '\x1b[A': 'up', '\x1b[1;1:1A': 'up', '\x1b[5;1:1~': 'page_up',
+    '\x1b[57407u': '8', '\x1b[57419u': 'up',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(('text', 'name'), OLD.items())
 def test_old_encodings(text: str, name: str) -> None:
-    """Characters, xterm's, VT220's and modifyOtherKeys' sequences name their key."""
+    """Characters and sequences name their key."""
     assert decode(text) == [(name, TYPED)]
 
 
-@pytest.mark.parametrize(
-    ('text', 'name'),
-    [
-        ('\x1b[105u', 'i'),
-        ('\x1b[105;;105u', 'i'),
-        ('\x1b[105;1:1;105u', 'i'),
-        ('\x1b[105:73;2:1;73u', 'I'),
-        ('\x1b[44:60;2:1;60u', '<'),
-        ('\x1b[44:60;2u', '<'),
-        ('\x1b[32;1:1;32u', 'space'),
-        ('\x1b[13u', 'enter'),
-        ('\x1b[27u', 'escape'),
-        ('\x1b[99;5u', 'ctrl+c'),
-        ('\x1b[1089::99;5u', 'ctrl+c'),
-        ('\x1b[1096::105;1:1;1096u', 'i'),
-        ('\x1b[1096:1064:105;2:1;1064u', 'I'),
-        ('\x1b[105;65:1;73u', 'I'),
-        ('\x1b[105;129:1;105u', 'i'),
-        ('\x1b[A', 'up'),
-        ('\x1b[1;1:1A', 'up'),
-        ('\x1b[5;1:1~', 'page_up'),
-        ('\x1b[57407u', '8'),
-        ('\x1b[57419u', 'up'),
-    ],
-)
+@pytest.mark.parametrize(('text', 'name'), KITTY.items())
 def test_kitty_presses(text: str, name: str) -> None:
-    """The protocol's optional parts, locks, other layouts and the keypad name the key meant."""
+    """Each form names the key meant."""
     assert decode(text, kitty=True) == [(name, PRESSED)]
 
 

@@ -193,14 +193,23 @@ def test_there_is_one_command_and_one_typed_key_at_most(
         assert keys.current(now) == (held[-1] if held else None)
 
 
-def test_typed_key_times_out_in_two_stages() -> None:
-    """One character holds for the delay of the repeat; repeats hold for a much shorter time."""
-    keys, _ = fed('0 type i')
-    assert keys.current(0.49) == 'i'
-    assert keys.current(0.5) is None
-    keys, _ = fed('0 type i, 0.4 type i, 0.43 type i')
-    assert keys.current(0.57) == 'i'
-    assert keys.current(0.58) is None
+@pytest.mark.parametrize(
+    ('events', 'time', 'key'),
+    [
+        # one character holds for the delay of the repeat
+        ('0 type i', 0.49, 'i'),
+        ('0 type i', 0.5, None),
+        # repeats hold for a much shorter time
+        ('0 type i, 0.4 type i, 0.43 type i', 0.57, 'i'),
+        ('0 type i, 0.4 type i, 0.43 type i', 0.58, None),
+        # where releases are known, the key below the newest takes over when that goes up
+        ('0 press i, 1 press l', 1.0, 'l'),
+        ('0 press i, 1 press l, 2 release l', 2.0, 'i'),
+    ],
+)
+def test_what_is_held(events: str, time: float, key: str | None) -> None:
+    """A typed key times out in two stages; one that was pressed is held until its release."""
+    assert fed(events)[0].current(time) == key
 
 
 TAPS = '0 type i, 0.3 type i, 0.6 type i, 0.75 type i, 1.1 type i, 1.3 type i'
@@ -229,14 +238,6 @@ def test_second_tap_within_the_delay_gets_the_long_time_out() -> None:
         '0 type i, 0.5 type i, 0.53 type i, 0.56 type i, 5 type i, 5.25 type i'
     )
     assert keys.current(5.25 + auto_repeat.first - 0.01) == 'i'
-
-
-def test_earlier_key_counts_again() -> None:
-    """Where releases are known, the key below the newest one takes over when that goes up."""
-    keys, _ = fed('0 press i, 1 press l')
-    assert keys.current(1.0) == 'l'
-    keys.feed(KeyEvent('l', KeyAction.RELEASED, 2.0))
-    assert keys.current(2.0) == 'i'
 
 
 @pytest.mark.parametrize(('first', 'repeat'), [(0.1, 0.2), (0.5, 0.0), (0.0, 0.0)])

@@ -78,10 +78,7 @@ def test_gamepad_of_the_kernel() -> None:
     import evdev
 
     stick = evdev.AbsInfo(value=0, min=-100, max=100, fuzz=0, flat=0, resolution=0)
-    capabilities: dict[int, Any] = {
-        EV_KEY: [BTN_SOUTH],
-        EV_ABS: [(ABS_X, stick), (ABS_Y, stick)],
-    }
+    capabilities: dict[int, Any] = {EV_KEY: [BTN_SOUTH], EV_ABS: [(ABS_X, stick), (ABS_Y, stick)]}
     name = f'Workspace test gamepad {os.getpid()}'
     gamepad = Gamepad(InputDevices(), device=name)
     states: list[GamepadState] = []
