@@ -8,6 +8,7 @@ in between and after. Two drives move: the fault meets the first, and the second
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import re
 from typing import Any
@@ -23,7 +24,6 @@ from drive_samples import (
     pdo,
     SCALE,
     sdo_write,
-    with_defaults,
 )
 import pytest
 
@@ -286,76 +286,56 @@ def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
     assert arm.net.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
 
 
-def rates(velocity: float, acceleration: float) -> FaultInjection:
-    """Return a drive that counts in units of so many [inc/s] and [inc/s^2]."""
-    return FaultInjection(Deviation.RATE_UNITS, velocity=velocity, acceleration=acceleration)
+Unit = tuple[FaultInjection, dict[str, Any], int]
+"""How a drive deviates, how its bus.yml says it, and where its 0 is in [inc]."""
 
 
-REVOLUTION = 6283.0  # [inc] of a motor
-RPM = REVOLUTION / 60.0  # [inc/s]
-SERVO_CYCLE = 125e-6  # [s]
-FIXED_POINT = 2.0**-16
-SI_UNITS = {(0x60A9, 0): 0xFFB5_0300, (0x60AA, 0): 0x01B5_5700}  # 0.1 inc/s, 10 inc/s^2
-FACTOR_GROUP = {(0x6096, 1): 10, (0x6096, 2): 1, (0x6097, 1): 1, (0x6097, 2): 100}  # the same
-RATES: dict[str, tuple[FaultInjection, dict[tuple[int, int], int]]] = {
-    'rpm and 0.1 rpm/s': (rates(RPM, RPM / 10.0), {}),
-    'inc/s and inc/s in a ms': (rates(1.0, 1000.0), {}),
-    '16.16': (rates(FIXED_POINT / SERVO_CYCLE, FIXED_POINT / SERVO_CYCLE**2), {}),
-    'SI units': (rates(0.1, 10.0), SI_UNITS),
-    'factor group': (rates(0.1, 10.0), FACTOR_GROUP),
-}
-"""Units of velocities and accelerations that differ by more than a second.
+def rates(
+    velocity: float, acceleration: float, objects: Mapping[tuple[int, int], int] | None = None
+) -> Unit:
+    """Return a drive that counts in units of so many [inc/s] and [inc/s^2].
 
-With the objects in which the drive says its unit of accelerations; else bus.yml says it.
-"""
-
-
-def in_units(units: FaultInjection, objects: dict[tuple[int, int], int]) -> dict[str, Any]:
-    """Return the configuration of a drive with such units, and with the motion of the others."""
-    assert units.velocity is not None
-    assert units.acceleration is not None
-    velocity, acceleration = units.velocity, units.acceleration
+    Its ``objects`` say its unit of accelerations; without any, bus.yml does.
+    """
+    injection = FaultInjection(Deviation.RATE_UNITS, velocity=velocity, acceleration=acceleration)
     scales = {'scale_vel_to_dev': SCALE / velocity, 'scale_vel_from_dev': velocity / SCALE}
     if not objects:
         scales |= {'scale_acc_to_dev': SCALE / acceleration}
         scales |= {'scale_acc_from_dev': acceleration / SCALE}
     writes = (
         sdo_write(0x60C2, 1, round(1000 * CYCLE)),
-        sdo_write(0x6081, 0, round(10_000 / velocity)),
-        sdo_write(0x607F, 0, round(30_000 / velocity)),
+        *(sdo_write(i, 0, round(v / velocity)) for i, v in ((0x6081, 10_000), (0x607F, 30_000))),
         *(sdo_write(ramp, 0, round(50_000 / acceleration)) for ramp in (0x6083, 0x6084)),
         sdo_write(0x6085, 0, round(100_000 / acceleration)),
     )
     known = drive_dictionary().for_node(NODE_ID)
-    added = (
+    units = (
         ObjectEntry(*address, 'Unit', DataType.UNSIGNED32, default=value)
-        for address, value in objects.items()
-        if known.get(*address) is None
+        for address, value in (objects or {}).items()
     )
-    dictionary = ObjectDictionary([*with_defaults(known, objects), *added])
-    return {'scales': scales, 'sdo_writes': writes, 'dictionary': dictionary}
+    others = (entry for entry in known if entry.address not in (objects or {}))
+    dictionary = ObjectDictionary([*others, *units])
+    return injection, {'scales': scales, 'sdo_writes': writes, 'dictionary': dictionary}, 0
 
 
-def offsets(position_inc: int) -> dict[str, Any]:
-    """Return the configuration of a drive whose 0 is elsewhere than that of its encoder."""
-    scales = {'offset_pos_to_dev': position_inc, 'offset_pos_from_dev': -position_inc / SCALE}
-    return {'scales': scales}
-
-
-UNITS: dict[str, tuple[FaultInjection, dict[str, Any], int]] = {
-    **{name: (units, in_units(units, said), 0) for name, (units, said) in RATES.items()},
-    'position offset': (
-        FaultInjection(Deviation.OBJECT_KEPT, object=(0x60B0, 0), value=1_000),
-        {},
-        0,
-    ),
-    'offset in bus.yml': (
-        FaultInjection(Deviation.ENCODER_SHIFTED, position=7_000),
-        offsets(7_000),
-        7_000,
-    ),
+RPM = 6283.0 / 60.0  # [inc/s]
+SERVO_CYCLE = 125e-6  # [s]
+FIXED_POINT = 2.0**-16
+# 0.1 inc/s and 10 inc/s^2, in two ways
+SI_UNITS = {(0x60A9, 0): 0xFFB5_0300, (0x60AA, 0): 0x01B5_5700}
+FACTOR_GROUP = {(0x6096, 1): 10, (0x6096, 2): 1, (0x6097, 1): 1, (0x6097, 2): 100}
+KEPT_OFFSET = FaultInjection(Deviation.OBJECT_KEPT, object=(0x60B0, 0), value=1_000)
+SHIFTED = FaultInjection(Deviation.ENCODER_SHIFTED, position=7_000)
+OFFSET = {'scales': {'offset_pos_to_dev': 7_000.0, 'offset_pos_from_dev': -7_000.0 / SCALE}}
+UNITS: dict[str, Unit] = {
+    'rpm and 0.1 rpm/s': rates(RPM, RPM / 10.0),
+    'inc/s and inc/s in a ms': rates(1.0, 1000.0),
+    '16.16': rates(FIXED_POINT / SERVO_CYCLE, FIXED_POINT / SERVO_CYCLE**2),
+    'SI units': rates(0.1, 10.0, SI_UNITS),
+    'factor group': rates(0.1, 10.0, FACTOR_GROUP),
+    'position offset': (KEPT_OFFSET, {}, 0),
+    'offset in bus.yml': (SHIFTED, OFFSET, 7_000),
 }
-"""How a drive deviates, how its bus.yml says it, and where its 0 is in [inc]."""
 DECELERATION, QUICK_STOP_DECELERATION = 5.0, 10.0  # [rad/s^2]
 SLOWEST_DECELERATION = 2.0  # [rad/s^2] that of mode 2
 LATE = 4.0 * CYCLE  # [s] between the command and the beginning of the ramp
@@ -364,13 +344,13 @@ LATE = 4.0 * CYCLE  # [s] between the command and the beginning of the ramp
 @pytest.mark.parametrize(
     'modes', [POSITION_MODES, VELOCITY_MODES[1:]], ids=['position', 'velocity']
 )
-@pytest.mark.parametrize('number', range(len(UNITS)), ids=list(UNITS))
+@pytest.mark.parametrize('unit', UNITS)
 def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
-    number: int, modes: tuple[OperationMode, ...]
+    unit: str, modes: tuple[OperationMode, ...]
 ) -> None:
     """Enabling moves nothing, targets are where they were said, and no stop is cut or long."""
-    deviation, faulty, zero = list(UNITS.values())[number]
-    mode = modes[number % len(modes)]
+    deviation, faulty, zero = UNITS[unit]
+    mode = modes[list(UNITS).index(unit) % len(modes)]
     arm = Arm(0.3, deviation, **faulty)
 
     def place() -> float:
@@ -387,13 +367,10 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
         speed, at = arm.net.speed(), place()
         assert speed == pytest.approx(SPEED if mode in VELOCITY_MODES else 1.0, rel=0.1)
         arm.net.do(FAULTY, stop, preempt=True)
-        ramp = DECELERATION if stop == 'halt' else QUICK_STOP_DECELERATION
-        shortest = speed**2 / 2.0 / ramp
-        if stop == 'disable':
-            longest = speed**2 / 2.0 / DECELERATION + LATE * speed
-        else:
-            longest = shortest + LATE * speed
-        assert 0.9 * shortest < place() - at < longest, (stop, shortest, longest)
+        steep = DECELERATION if stop == 'halt' else QUICK_STOP_DECELERATION
+        flat = QUICK_STOP_DECELERATION if stop == 'quick_stop' else DECELERATION
+        shortest, longest = (speed**2 / 2.0 / ramp for ramp in (steep, flat))
+        assert 0.9 * shortest < place() - at < longest + LATE * speed, (stop, shortest, longest)
         arm.stands(FAULTY)
     arm.net.enable(OperationMode.CYCLIC_POSITION, FAULTY)
     arm.net.target(0.3)
@@ -601,9 +578,14 @@ def test_an_nmt_command_says_which_axis_was_not_seen_to_stand() -> None:
     assert arm.net.reported(Severity.WARNING).count(said) == 1
 
 
-@pytest.mark.parametrize('node_id', [NODE_ID, 0])
-def test_an_axis_that_coasts_without_power_is_not_seen_to_stand(node_id: int) -> None:
-    """The answer names it, and a warning does for those who get none; once it rests, neither."""
+@pytest.mark.parametrize(('node_id', 'by_sdo'), [(NODE_ID, False), (NODE_ID, True), (0, False)])
+def test_an_axis_that_coasts_without_power_is_not_seen_to_stand(
+    node_id: int, *, by_sdo: bool
+) -> None:
+    """The answer names it, and a warning does for those who get none; once it rests, neither.
+
+    That is seen by SDO where its TPDOs do not come.
+    """
     net = VirtualNetwork(
         bus_config(every_mode(drive_config(FAULTY, NODE_ID))), servo=ServoModel(coasting=0.5)
     )
@@ -622,20 +604,11 @@ def test_an_axis_that_coasts_without_power_is_not_seen_to_stand(node_id: int) ->
     assert net.reported(Severity.WARNING).count(unseen) == 1
     net.run(5.0)
     net.master.device(FAULTY).send_nmt(NmtCommand.START)
+    net.lose(*((0x180 + NODE_ID, 0x280 + NODE_ID) if by_sdo else ()))
     net.run(SETTLING)
+    assert net.drives[FAULTY].view.fresh is not by_sdo
     assert commanded(net, PRE_OPERATIONAL, node_id) == answer
     assert sum('not seen to stand' in text for text in net.reported(Severity.WARNING)) == 1
-
-
-def test_a_disabled_axis_whose_tpdos_do_not_come_is_seen_to_stand_by_sdo() -> None:
-    """It is not named as one that may move."""
-    net = VirtualNetwork(bus_config(every_mode(drive_config(FAULTY, NODE_ID))))
-    net.boot()
-    net.lose(0x180 + NODE_ID, 0x280 + NODE_ID)
-    net.run(1.0)
-    assert not net.drives[FAULTY].view.fresh
-    answer = f'NMT ENTER_PRE_OPERATIONAL sent to node {NODE_ID}'
-    assert commanded(net, PRE_OPERATIONAL, NODE_ID) == answer
 
 
 def commanded(net: VirtualNetwork, command: NmtCommand, node_id: int) -> str:
