@@ -40,7 +40,7 @@ from .motion import AxisFeedback, Refusal, RefusalCause, Setpoint
 from .parameters import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
 from .state_machine import Command, ControlwordOutput, fault_reset, next_command
-from .stop import BrakingWatch, Halt, StopSequence
+from .stop import ANSWER_CYCLES, BrakingWatch, Halt, StopSequence
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
@@ -137,6 +137,7 @@ class Axis:
         self._braking = BrakingWatch()
         self._following = FollowingWatch()
         self._followed = False  # statusword bit 12 in a cyclic mode, in the last cycle
+        self._halted_at = -math.inf  # steady time at which bit 8 was set for the last time in [s]
         self._led = self._streamed = False  # commanded by a motion source: last cycle, this cycle
         self._unseen_since: float | None = None
         self._polling: Task[None] | None = None
@@ -759,11 +760,14 @@ class Axis:
                 self._following.clear()
             return
         follows = bool(self.view.statusword & FOLLOWS_COMMAND)
-        lost, self._followed = self._followed and not follows, follows
+        now = self._scheduler.now
+        if self.halt_bits:  # which clear bit 12 in mode 10, also in the cycles after them
+            self._halted_at = now
+        shown = now - self._halted_at > ANSWER_CYCLES * self.period
+        lost, self._followed = self._followed and not follows, follows and shown
         if lost:
             rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
-            # bit 12 may be cleared in mode 7 at standstill, in mode 10 by a halt
-            if not (rests or self.halt_bits):
+            if not (rests or self.halt_bits):  # in mode 7 it may be cleared at standstill
                 self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
                 self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
         if isinstance(mode, CyclicPosition):

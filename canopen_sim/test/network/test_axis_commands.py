@@ -27,7 +27,7 @@ import pytest
 from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.cia402.sequences import HomingProgress
-from arm_canopen.config import DriveConfig, RecoveryPolicy
+from arm_canopen.config import DriveConfig
 from canopen_core.can import Frame
 from canopen_core.standard import (
     DataType,
@@ -75,6 +75,7 @@ def test_a_switch_to_torque_keeps_the_load(*, mapped: bool) -> None:
     net.run(0.2)
     assert net.motor() == pytest.approx(held, abs=0.05)
     net.do(JOINT, 'halt')
+    assert not net.reported(Severity.WARNING)  # bit 12 goes with bit 8, as commanded
     net.run(0.2)
     halted = struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6])[0]
     assert halted == pytest.approx(first, abs=30)  # the next target begins with the load, too
@@ -115,8 +116,7 @@ def test_a_torque_that_cannot_be_read_drops_no_load(
 
 def test_moves_are_for_mode_1_and_within_the_limits() -> None:
     """Another mode, a limit and a full queue are refused in words."""
-    limits = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
-    net = with_modes(sdo_writes=limits)
+    net = with_modes(sdo_writes=LIMITS)
     net.enable(OperationMode.CYCLIC_POSITION)
     with pytest.raises(DriveError, match='only in mode 1'):
         net.commands[JOINT].move(Move(0.1))
@@ -132,42 +132,43 @@ def test_moves_are_for_mode_1_and_within_the_limits() -> None:
         net.commands[JOINT].move(Move(0.1, immediate=False))
 
 
-def test_limits_count_from_home() -> None:
-    """0x607D less the home offset 0x607C, as the drive has them; also when that is written."""
-    limits = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
-    net = with_modes(sdo_writes=(*limits, sdo_write(0x607C, 0, 2_000)))
-    net.enable(OperationMode.PROFILE_POSITION)
-    drive = net.master.drive(JOINT)
-    with pytest.raises(DriveError, match=r'0\.4 is beyond the software limits -0\.7 to 0\.3'):
-        drive.move_to(0.4)
-    drive.move_to(-0.65)
-    assert net.motor() == pytest.approx(-0.65, abs=1e-3)
-    net.result(net.commands[JOINT].axis.node.objects.write_object(0x607C, 0, -2_000))
-    net.run(0.5)
-    with pytest.raises(DriveError, match=r'software limits -0\.3 to 0\.7'):
-        drive.move_to(0.8)
+LIMITS = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
 
 
 @pytest.mark.parametrize(
-    ('ends', 'limits'),
-    [((-3_000, 3_000), 0.3), ((-9_000, 9_000), 0.5), ((0, 0), 0.5), ((-(2**31), 2**31 - 1), 0.5)],
+    ('home', 'ends', 'low', 'high'),
+    [
+        *((2_000, (0, 0), -0.7, 0.3), (0, (0, 0), -0.5, 0.5)),  # 0x607D counts from home
+        *((0, (-3_000, 3_000), -0.3, 0.3), (0, (-9_000, 9_000), -0.5, 0.5)),
+        (0, (-(2**31), 2**31 - 1), -0.5, 0.5),
+    ],
 )
-def test_no_target_leads_beyond_where_positions_wrap(ends: tuple[int, int], limits: float) -> None:
-    """The range 0x607B, where there is one: behind its ends an axis is not seen where it is."""
-    config = drive_config(JOINT, NODE_ID)
+def test_no_target_leads_beyond_the_limits(
+    home: int, ends: tuple[int, int], low: float, high: float
+) -> None:
+    """0x607D less the home offset 0x607C, also when that is written, and the range 0x607B.
+
+    Behind the ends of that range positions wrap: an axis is not seen where it is.
+    """
+    config = drive_config(JOINT, NODE_ID, sdo_writes=(*LIMITS, sdo_write(0x607C, 0, home)))
     added = [
         ObjectEntry(0x607B, number, 'Position range limit', DataType.INTEGER32, default=end)
         for number, end in enumerate(ends, 1)
     ]
-    software = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
-    dictionary = ObjectDictionary([*config.dictionary, *added])
-    net = booted(replace(config, dictionary=dictionary, sdo_writes=software))
+    net = booted(replace(config, dictionary=ObjectDictionary([*config.dictionary, *added])))
     net.enable(OperationMode.CYCLIC_POSITION)
-    with pytest.raises(DriveError, match=f'software limits -{limits} to {limits} '):
-        net.target(limits + 0.1)
-    net.target(limits)
-    net.run(2.0)
-    assert net.motor() == pytest.approx(limits)
+    words = f'is beyond the software limits {low:g} to {high:g} '
+    for limit, beyond in ((low, low - 0.1), (high, high + 0.1)):
+        with pytest.raises(DriveError, match=f'{beyond:g} {words}'):
+            net.target(beyond)
+        net.target(limit)
+        net.run(2.0)
+        assert net.motor() == pytest.approx(limit, abs=1e-3)
+    if home:
+        net.result(net.commands[JOINT].axis.node.objects.write_object(0x607C, 0, -home))
+        net.run(0.5)
+        with pytest.raises(DriveError, match=r'software limits -0\.3 to 0\.7'):
+            net.target(0.8)
 
 
 def test_home_is_a_command_of_its_own() -> None:
@@ -271,21 +272,6 @@ def test_a_homing_method_is_for_this_time_only(end: str) -> None:
     assert end != 'fails' or 'method 99' in str(running.error)
     assert end == 'power' or method_of(net) == 35
     assert any('35 was not put back' in text for text in net.reported()) is (end == 'power')
-
-
-def test_recovery_does_not_reset_a_fault() -> None:
-    """A drive that comes back faulted is explained and left alone."""
-    net = with_modes(scales={'recovery': RecoveryPolicy.AUTO})
-    net.enable(OperationMode.CYCLIC_POSITION)
-    net.power_off(JOINT)
-    net.run(1.0)
-    device = net.power_on(JOINT)
-    assert device.drive is not None
-    device.drive.raise_fault(0x4310, net.now)
-    net.run_until(net.all_ready)
-    net.run(1.0)
-    assert net.drives[JOINT].view.state is DriveState.FAULT
-    assert any('not enabled again' in text for text in net.reported())
 
 
 def test_without_voltage_the_answer_names_the_safety_circuit() -> None:
@@ -546,7 +532,10 @@ def test_a_halted_torque_is_not_let_go_to_switch_the_mode(mode: OperationMode) -
 
 
 def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:
-    """In mode 7 some clear bit 12 at standstill; targets are reached, and nothing is reported."""
+    """In mode 7 some clear bit 12 at standstill; targets are reached, and nothing is reported.
+
+    In mode 8 the drive ignores its set-points then.
+    """
     net = with_modes()
     net.enable(OperationMode.INTERPOLATED_POSITION)
     drive = net.simulated()
@@ -564,6 +553,11 @@ def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:
         net.run(2.0)
         assert net.motor() == pytest.approx(target, abs=1e-3)
     assert net.reported(Severity.WARNING) == []
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)  # in which bit 12 has to stay
+    net.target(0.3)
+    net.run(2.0)
+    (warning,) = net.reported(Severity.WARNING)
+    assert 'does not follow its set-points any more (bit 12)' in warning
 
 
 def test_a_fault_speaks() -> None:
@@ -614,26 +608,23 @@ def test_an_unknown_position_is_never_published() -> None:
 
 
 def test_refusals_before_init() -> None:
-    """A target before enable and one without a mode say what to call."""
+    """Without enable, without a mode, without a method, while another command runs: what to do."""
     net = booted(drive_config(JOINT, 2))
     with pytest.raises(DriveError, match=r'init or enable it: 0x0250 Switch on disabled'):
         net.target(0.1)
+    first = net.begin(JOINT, 'init')
+    with pytest.raises(DriveError, match=r'busy: init is running'):
+        net.do(JOINT, 'enable')
+    net.do(JOINT, 'disable', preempt=True)  # one that stops is not refused
+    with pytest.raises(DriveError, match=r'init was ended by disable'):
+        first.result()
     net.do(JOINT, 'init')
+    with pytest.raises(DriveError, match='no homing method'):
+        net.do(JOINT, 'home')
     with pytest.raises(DriveError, match=r'no mode of operation.*position_mode'):
         net.target(0.1)
     with pytest.raises(DriveError, match=r'in no RPDO'):
         net.select(JOINT, OperationMode.CYCLIC_TORQUE)
-
-
-def test_busy_is_said_and_halt_preempts() -> None:
-    """A second command is refused by name while one runs; one that stops is not."""
-    net = booted(drive_config(JOINT, 2))
-    first = net.begin(JOINT, 'init')
-    with pytest.raises(DriveError, match=r'busy: init is running'):
-        net.do(JOINT, 'enable')
-    net.do(JOINT, 'disable', preempt=True)
-    with pytest.raises(DriveError, match=r'init was ended by disable'):
-        first.result()
 
 
 @pytest.mark.parametrize('bits', [True, False], ids=['old bits', 'no bits'])

@@ -74,15 +74,6 @@ def assert_rests(net: VirtualNetwork, duration: float = 0.5) -> None:
     assert net.motor() == pytest.approx(begin, abs=2e-3)
 
 
-def test_a_halt_in_mode_10_is_not_said_to_be_a_lost_command() -> None:
-    """Bit 12 goes with bit 8, as commanded."""
-    net = running_in(OperationMode.CYCLIC_TORQUE)
-    net.target(100.0)
-    net.run(0.5)
-    net.do(JOINT, 'halt')
-    assert not net.reported(Severity.WARNING)
-
-
 @pytest.mark.parametrize('kind', [SetPointKind.ALWAYS, SetPointKind.UNLESS_FULL])
 def test_an_immediate_move_does_not_wait_for_a_full_drive(kind: SetPointKind) -> None:
     """What is said to go at once goes at once, and what the drive held is discarded.
@@ -117,20 +108,6 @@ def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
     assert 'to 9.1,' in commands.move(Move(0.1, relative=True))
     go(net, 12.0)
     assert net.motor() == pytest.approx(9.1, abs=2e-3)
-
-
-def test_a_queued_move_after_a_halt_goes_at_once() -> None:
-    """The halt has ended the moves before it, so there is nothing that it could wait for."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.target(2.0)
-    net.run(0.4)
-    net.do(JOINT, 'halt', preempt=True)
-    rest = net.motor()
-    assert 'at once' in net.commands[JOINT].move(Move(0.0, immediate=False))
-    assert 'after the moves' in net.commands[JOINT].move(Move(0.1, immediate=False))
-    highest = go(net, 4.0)
-    assert highest < rest + 5e-3
-    assert net.motor() == pytest.approx(0.1, abs=2e-3)
 
 
 def test_a_drive_without_acknowledge_is_reported_once() -> None:
@@ -204,19 +181,22 @@ def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
     assert net.motor() == pytest.approx(0.4, abs=2e-3)
 
 
-def test_a_relative_move_after_a_halt_is_refused() -> None:
-    """It would count from the target that was given up; after an absolute one it is taken."""
+def test_a_halt_has_ended_the_moves_before_it() -> None:
+    """A relative one would count from what was given up; a queued one has nothing to wait for."""
     net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
     net.target(2.0)
-    net.run(0.5)
+    net.run(0.4)
     net.do(JOINT, 'halt', preempt=True)
+    rest = net.motor()
     with pytest.raises(DriveError, match=r'joint1: a relative move counts.*absolute'):
-        net.commands[JOINT].move(Move(0.1, relative=True))
+        commands.move(Move(0.1, relative=True))
     assert_rests(net)
-    net.commands[JOINT].move(Move(0.5))
-    net.commands[JOINT].move(Move(0.1, relative=True))
-    go(net, 3.0)
-    assert net.motor() == pytest.approx(0.6, abs=2e-3)
+    assert 'at once' in commands.move(Move(0.0, immediate=False))
+    assert 'after the moves' in commands.move(Move(0.1, relative=True, immediate=False))
+    highest = go(net, 4.0)
+    assert highest < rest + 5e-3
+    assert net.motor() == pytest.approx(0.1, abs=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -264,20 +244,22 @@ def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on()
     assert_rests(net)
 
 
-@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
+@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown', 'fault'])
 def test_recovery_does_not_undo_a_stop(verb: str) -> None:
-    """A drive that was commanded to stop while it was away is not enabled when it comes back."""
-    scales = {'recovery': RecoveryPolicy.AUTO}
-    net = running_in(OperationMode.CYCLIC_POSITION, scales=scales)
+    """A drive that was stopped while it was away, or is faulted, is not enabled by itself."""
+    net = running_in(OperationMode.CYCLIC_POSITION, scales={'recovery': RecoveryPolicy.AUTO})
     net.power_off(JOINT)
     net.run(1.0)
-    if verb:
+    if verb not in {'', 'fault'}:
         with pytest.raises(DriveError, match='cut its power: offline'):
             net.do(JOINT, verb, preempt=True)
     net.power_on(JOINT)
+    if verb == 'fault':
+        net.simulated().raise_fault(0x4310, net.now)
     net.run(3.0)
     enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert enabled is not bool(verb)
+    assert any('not enabled again' in text for text in net.reported()) is (verb == 'fault')
 
 
 @pytest.mark.parametrize('cycles', range(4, 60, 4))
