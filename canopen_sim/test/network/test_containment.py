@@ -201,11 +201,11 @@ def report_actual(net: VirtualNetwork, position: int | None, velocity: int | Non
 
 def assert_served(net: VirtualNetwork) -> None:
     """Check that SYNC goes on and the first drive accepts targets."""
-    begin = net.now
-    net.commands[GOOD].set_target(0.3)
+    begin, target = net.now, 0.0 if net.motor(GOOD) > 0.1 else 0.3
+    net.commands[GOOD].set_target(target)
     net.run(2.0)
     assert len(net.frames(0x080, since=begin)) == pytest.approx(2.0 / PERIOD, abs=2)
-    assert net.motor(GOOD) == pytest.approx(0.3, abs=2e-3)
+    assert net.motor(GOOD) == pytest.approx(target, abs=2e-3)
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION])
@@ -302,26 +302,25 @@ MISDEEDS: dict[str, tuple[Callable[[float], Sequence[float]], str]] = {
 }
 
 
-@pytest.mark.parametrize(
-    ('name', 'after'),
-    [(name, 10) for name in MISDEEDS] + [('jump', 0), ('NaN', 0), ('exception', 0)],
-)
-def test_a_source_that_misbehaves_loses_its_axis(name: str, after: int) -> None:
+@pytest.mark.parametrize('after', [0, 10], ids=['at the start', 'on its way'])
+def test_a_source_that_misbehaves_loses_its_axis(after: int) -> None:
     """At the start and on its way: the axis is braked and released, and nothing jumps."""
-    misdeed, said = MISDEEDS[name]
     net = pair(OperationMode.CYCLIC_POSITION)
     net.allows_defects = True
-    source = Misbehaving(misdeed, after)
-    net.master.attach(source)
-    begin = net.motor(GOOD)
-    net.run(0.5)
-    assert net.motor(GOOD) == pytest.approx(begin, abs=1e-3)
-    if GOOD in source.losses:
-        assert source.losses[GOOD].cause is RefusalCause.SETPOINT_REFUSED
-        assert said in source.losses[GOOD].detail
-    else:
-        assert any(said in text for text in net.reported(Severity.ERROR))
-    assert_served(net)
+    for name, (misdeed, said) in MISDEEDS.items():
+        net.events.clear()
+        source = Misbehaving(misdeed, after)
+        net.master.attach(source)
+        begin = net.motor(GOOD)
+        net.run(0.5)
+        assert net.motor(GOOD) == pytest.approx(begin, abs=1e-3), name
+        if GOOD in source.losses:
+            assert source.losses[GOOD].cause is RefusalCause.SETPOINT_REFUSED, name
+            assert said in source.losses[GOOD].detail, name
+        else:
+            assert any(said in text for text in net.reported(Severity.ERROR)), name
+        net.master.detach(source)
+        assert_served(net)
 
 
 def test_a_source_that_fails_when_it_loses_its_axis_harms_nobody() -> None:
