@@ -97,12 +97,18 @@ def _message(**fields: object) -> can.Message:
 
 @pytest.mark.usefixtures('opened_with')
 def test_echoes_and_fd_messages_are_not_delivered(messages: list[can.Message]) -> None:
-    """Drivers that echo mark it; CAN FD messages are counted and dropped."""
+    """Drivers that echo mark it; CAN FD messages are counted and dropped.
+
+    A frame that the driver refuses is counted, and its error becomes ours, with its reason.
+    """
     messages += [_message(is_rx=False), _message(is_fd=True, data=bytes(64)), _message(data=b'1')]
     with open_bus('pcan:X') as bus:
         frames = bus.receive(0.0)
         assert [frame[:2] for frame in frames] == [(0x181, b'1')]
         assert bus.counters.malformed == 1
+        with pytest.raises(BusError, match='bus off'):
+            bus.send(Frame(1))
+        assert (bus.counters.sent, bus.counters.send_errors) == (0, 1)
 
 
 @pytest.mark.usefixtures('opened_with')
@@ -115,15 +121,6 @@ def test_stamps_of_drivers_become_steady_time(messages: list[can.Message], age: 
         (frame,) = bus.receive(0.0)
     # a busy machine may pause between two looks at the clocks
     assert before - 0.2 <= frame.timestamp + expected <= monotonic() + 0.2
-
-
-@pytest.mark.usefixtures('opened_with')
-def test_a_refused_frame_is_counted_and_reported() -> None:
-    """The driver's error becomes ours, with its reason."""
-    with open_bus('pcan:X') as bus:
-        with pytest.raises(BusError, match='bus off'):
-            bus.send(Frame(1))
-        assert (bus.counters.sent, bus.counters.send_errors) == (0, 1)
 
 
 class SerialAdapter:

@@ -109,7 +109,10 @@ def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
 
 
 def test_a_full_transmit_queue_is_reported_and_not_waited_for(kernel: socket.socket) -> None:
-    """Refused frames are counted and raise at once; when there is room again sending goes on."""
+    """Refused frames are counted and raise at once; when there is room again sending goes on.
+
+    A read of another length than that of a frame is counted, and does not end the bus.
+    """
     with SocketCanBus('can0') as bus:
         with pytest.raises(BusError, match='transmit queue of can0 is full'):
             send_for_ever(bus)
@@ -119,11 +122,6 @@ def test_a_full_transmit_queue_is_reported_and_not_waited_for(kernel: socket.soc
             assert kernel.recv(16) == pack(Frame(1))
         bus.send(Frame(2))
         assert bus.counters.sent == accepted + 1
-
-
-def test_what_is_no_frame_of_the_kernel_is_dropped(kernel: socket.socket) -> None:
-    """A read of another length is counted and does not end the bus."""
-    with SocketCanBus('can0') as bus:
         kernel.send(b'short')
         kernel.send(pack(Frame(3, b'\x01')))
         assert unstamped(receive_count(bus, 1)) == [Frame(3, b'\x01')]
