@@ -277,7 +277,10 @@ def test_another_device_is_refused_with_the_remedy(name: str) -> None:
 
 @pytest.mark.parametrize('place', [(0x1800, 2), (0x1A00, 1), (0x6081, 0), (0x1017, 0)])
 def test_a_refused_configuration_is_reported_with_place_and_reason(place: tuple[int, int]) -> None:
-    """The abort is reported in words with the object, once for each reason; boot is repeated."""
+    """The abort is reported in words with the object, once for each reason; boot is repeated.
+
+    So is the time-out of a device that falls silent meanwhile; it is looked for again and found.
+    """
     scene = Scene(refuses={place: 0x0609_0030})
     scene.start(30.0)
     (failure,) = scene.reported(EventKind.BOOT_FAILED)
@@ -289,7 +292,20 @@ def test_a_refused_configuration_is_reported_with_place_and_reason(place: tuple[
     scene.device.refuses[0x6098, 0] = 0x0601_0002
     scene.run(5.0)
     assert len(scene.reported(EventKind.BOOT_FAILED)) == 2
+
+    def fall_silent(request: bytes) -> None:
+        if request[1:3] == b'\x00\x1a':
+            scene.device.answers = False
+
     scene.device.refuses.clear()
+    scene.device.on_request = fall_silent
+    scene.run(20.0)
+    _, _, silent, lost = scene.reported(EventKind.BOOT_FAILED)
+    assert 'while configuring' in silent
+    assert '0x1A00:' in silent
+    assert 'no answer yet' in lost
+    scene.device.on_request = lambda request: None
+    scene.device.answers = True
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
@@ -361,26 +377,6 @@ def test_a_restart_in_the_middle_of_a_boot_starts_it_again(moments: set[int]) ->
     assert scene.reported(EventKind.BOOT_FAILED) == []
     assert not [data for data in scene.net.frames(0x600 + NODE_ID) if data[0] == ABORT]
     assert scene.node.online
-
-
-def test_a_device_that_falls_silent_while_it_is_configured() -> None:
-    """The time-out names the object; the device is looked for again and found."""
-    scene = Scene()
-
-    def fall_silent(request: bytes) -> None:
-        if request[1:3] == b'\x00\x1a':
-            scene.device.answers = False
-
-    scene.device.on_request = fall_silent
-    scene.start(20.0)
-    failures = scene.reported(EventKind.BOOT_FAILED)
-    assert 'while configuring' in failures[0]
-    assert '0x1A00:' in failures[0]
-    assert 'no answer yet' in failures[1]
-    assert len(failures) == 2
-    scene.device.on_request = lambda request: None
-    scene.device.answers = True
-    scene.net.run_until(scene.net.all_ready, 3.0)
 
 
 def test_a_device_without_heartbeat_is_reported_and_not_started_again() -> None:
