@@ -586,31 +586,26 @@ def test_the_event_timer_by_default(tmp_path: Path) -> None:
         assert [write.requested for write in writes] == ['event_timer' in keys] * len(writes)
 
 
-@pytest.mark.parametrize('sync_period', [10_000, 0])
-@pytest.mark.parametrize(
-    ('keys', 'lossy', 'lossy_without_sync'),
-    [
+def test_check_and_boot_name_what_may_get_lost(tmp_path: Path) -> None:
+    """The one before anything runs, at the place of the key, the other when it does."""
+    for keys, *lossy in (
         ('transmission: 255', False, False),
         ('transmission: 255, event_timer: 0', True, True),
         ('transmission: 0', True, True),
         ('transmission: 1', False, True),
         ('from EDS: 252', True, True),
         ('from EDS: 253', True, True),
-    ],
-)
-def test_check_and_boot_name_what_may_get_lost(
-    tmp_path: Path, keys: str, sync_period: int, *, lossy: bool, lossy_without_sync: bool
-) -> None:
-    """The one before anything runs, at the place of the key, the other when it does."""
-    if keys.startswith('from EDS'):
-        eds = DRIVE_EDS.read_text().split('[1800sub2]')
-        eds[1] = re.sub('DefaultValue=.*', f'DefaultValue={keys[-3:]}', eds[1], count=1)
-        (tmp_path / 'other.eds').write_text('[1800sub2]'.join(eds))
-        bus = bus_with(tmp_path, '', sync_period, eds='other.eds')
-    else:
-        bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n', sync_period)
-    found = [str(problem) for problem in check_bus(bus).warnings]
-    expected = lossy if sync_period else lossy_without_sync
-    assert any('the loss of TPDO 1' in text for text in found) is expected
-    sync = SyncRound(lambda: None, period=bus.master.sync_period)
-    assert ReceivedTpdo(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected
+    ):
+        for expected, sync_period in zip(lossy, (10_000, 0), strict=True):
+            if keys.startswith('from EDS'):
+                eds = DRIVE_EDS.read_text().split('[1800sub2]')
+                eds[1] = re.sub('DefaultValue=.*', f'DefaultValue={keys[-3:]}', eds[1], count=1)
+                (tmp_path / 'other.eds').write_text('[1800sub2]'.join(eds))
+                bus = bus_with(tmp_path, '', sync_period, eds='other.eds')
+            else:
+                bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n', sync_period)
+            found = [str(problem) for problem in check_bus(bus).warnings]
+            named = any('the loss of TPDO 1' in text for text in found)
+            sync = SyncRound(lambda: None, period=bus.master.sync_period)
+            unnoticed = ReceivedTpdo(bus.nodes[0].tpdos[0], sync).loss_unnoticed
+            assert named is unnoticed is expected, (keys, sync_period)
