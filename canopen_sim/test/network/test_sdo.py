@@ -589,43 +589,40 @@ def test_a_write_whose_end_is_not_answered_is_not_repeated() -> None:
 
 def test_a_server_without_blocks_gets_segments() -> None:
     """Blocks are requested once, and then never again."""
-    line = BlockLine()
-    sent: list[bytes] = []
-    client = SdoClient(NODE, 'joint1', line.scheduler, lambda frame: sent.append(frame.data))
+    line = Line()
+
+    def answer(request: bytes) -> bytes:
+        if request[0] >> 5 == 6:
+            return bytes.fromhex('80 02 20 00 01 00 04 05')
+        if request[0] >> 5 == 1:
+            return bytes.fromhex('60 02 20 00 00 00 00 00')
+        return bytes((0x20 | request[0] & 0x10,)) + bytes(7)
+
     for _ in range(2):
-        client.write(BLOB, 0, bytes(BLOCK_MIN), TIMEOUT)
-        while sent:
-            request = sent.pop(0)
-            if request[0] >> 5 == 6:
-                answer = '80 02 20 00 01 00 04 05'
-            elif request[0] >> 5 == 1:
-                answer = '60 02 20 00 00 00 00 00'
-            else:
-                answer = f'{0x20 | request[0] & 0x10:02X} 00 00 00 00 00 00 00'
-            client.receive(Frame(RESPONSE, bytes.fromhex(answer)))
-    assert (client.counters.done, client.counters.aborted) == (2, 1)
+        line.client.write(BLOB, 0, bytes(BLOCK_MIN), TIMEOUT)
+        line.serve(answer)
+    assert (line.client.counters.done, line.client.counters.aborted) == (2, 1)
 
 
 def test_golden_frames_of_a_write() -> None:
     """300 bytes: two blocks of at most 40 segments, then the end with length and checksum."""
-    sent: list[bytes] = []
-    scheduler = Scheduler()
-    client = SdoClient(NODE, 'joint1', scheduler, lambda frame: sent.append(frame.data))
+    line = Line()
+    sent = line.sent
     value = bytes(number % 251 for number in range(300))
-    done = client.write(BLOB, 0, value, TIMEOUT)
+    done = line.client.write(BLOB, 0, value, TIMEOUT)
     assert sent == [bytes.fromhex('C6 02 20 00 2C 01 00 00')]
-    client.receive(Frame(RESPONSE, bytes.fromhex('A4 02 20 00 28 00 00 00')))
+    line.receive('A4 02 20 00 28 00 00 00')
     for _ in range(10):
-        scheduler.advance(scheduler.now + 0.001)
+        line.pass_time(0.001)
     assert [data[0] for data in sent[1:]] == list(range(1, 41))
-    client.receive(Frame(RESPONSE, bytes.fromhex('A2 28 28 00 00 00 00 00')))
+    line.receive('A2 28 28 00 00 00 00 00')
     assert [data[0] for data in sent[41:]] == [1, 2, 0x83]
     assert b''.join(data[1:] for data in sent[1:]).rstrip(b'\0') == value.rstrip(b'\0')
-    client.receive(Frame(RESPONSE, bytes.fromhex('A2 03 28 00 00 00 00 00')))
+    line.receive('A2 03 28 00 00 00 00 00')
     crc = crc_hqx(value, 0).to_bytes(2, 'little')
     assert sent[-1] == bytes((0xC1 | 1 << 2,)) + crc + bytes(5)
     assert not done.done
-    client.receive(Frame(RESPONSE, bytes.fromhex('A1 00 00 00 00 00 00 00')))
+    line.receive('A1 00 00 00 00 00 00 00')
     assert done.done
     assert done.error is None
 
