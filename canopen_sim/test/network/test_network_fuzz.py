@@ -7,7 +7,7 @@ from __future__ import annotations
 import random
 
 from bus_rig import VirtualNetwork
-from drive_samples import bus_config, drive_config, PERIOD, SCALE
+from drive_samples import bus_config, drive_config, PERIOD
 import pytest
 
 from arm_canopen import DriveState, OperationMode
@@ -98,8 +98,7 @@ def test_anything_on_the_bus() -> None:
 
 def motors(network: VirtualNetwork) -> list[float]:
     """Return where the motors really are in [rad]."""
-    drives = [device.drive for device in network.devices.values()]
-    return [drive.position / SCALE for drive in drives if drive is not None]
+    return [network.motor(name) for name in network.devices]
 
 
 def assert_cyclic(network: VirtualNetwork) -> None:
@@ -117,11 +116,9 @@ def test_noise_moves_nothing() -> None:
     states: set[NmtState] = set()
     for _ in range(FRAMES // BURST):
         make_noise(network, source, commanding=False)
-        for device in network.devices.values():
+        for name, device in network.devices.items():
             states.add(device.nmt_state)
-            drive = device.drive
-            assert drive is not None
-            drive.advance(network.now)
-            assert drive.position == 0.0
+            network.simulated(name).advance(network.now)
+            assert network.motor(name) == 0.0
             assert not device.store.integer(0x6040).value & 0x08
     assert states == {NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED}
