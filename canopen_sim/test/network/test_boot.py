@@ -190,22 +190,6 @@ def test_the_whole_configuration_in_its_order() -> None:
     assert not [write for write in alone.device.writes if 0x1400 <= write[0] < 0x1C00]
 
 
-def test_nothing_is_written_before_pre_operational_and_after_start() -> None:
-    """The device is configured while it processes no PDOs, also when it received no reset."""
-    scene = Scene()
-    scene.device.state = NmtState.OPERATIONAL
-    scene.device.deaf_to_reset = True
-    states: set[NmtState] = set()
-
-    def note(request: bytes) -> None:
-        if request[0] >> 5 == 1:
-            states.add(scene.device.state)
-
-    scene.device.on_request = note
-    scene.boot()
-    assert states == {NmtState.PRE_OPERATIONAL}
-
-
 def test_what_cannot_be_written_is_not_written() -> None:
     """Neither a heartbeat that is constant nor a mapping for ever; the rest of the PDO is."""
     config = io_config()
@@ -309,16 +293,30 @@ def test_a_refused_configuration_is_reported_with_place_and_reason(place: tuple[
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
+@pytest.mark.parametrize('deaf', [True, False], ids=['runs on', 'restarts without a word'])
 @pytest.mark.parametrize('known', [True, False], ids=['0x1000', 'abort'])
-def test_a_device_that_misses_the_reset_is_found(*, known: bool) -> None:
-    """Without a boot-up message any answer to 0x1000 is enough, however slow."""
+def test_a_device_that_misses_the_reset_is_found(*, known: bool, deaf: bool) -> None:
+    """Without a boot-up message any answer to 0x1000 is enough, however slow.
+
+    It is configured while it processes no PDOs: nothing is written before Pre-operational and
+    after the start.
+    """
     scene = Scene(io_config(identity=IDENTITY if known else Identity()))
-    scene.device.announces = False
+    scene.device.announces, scene.device.deaf_to_reset = False, deaf
+    scene.device.state = NmtState.OPERATIONAL
     scene.device.answer_time = 0.03  # [s] many think so long
     if not known:
         del scene.device.values[0x1000, 0]
+    states: set[NmtState] = set()
+
+    def note(request: bytes) -> None:
+        if request[0] >> 5 == 1:
+            states.add(scene.device.state)
+
+    scene.device.on_request = note
     scene.boot()
     assert scene.reported(EventKind.BOOT_FAILED) == []
+    assert states == {NmtState.PRE_OPERATIONAL}
 
 
 @pytest.mark.parametrize('announces', [True, False])
