@@ -15,6 +15,7 @@ from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from enum import auto, Enum
+from itertools import groupby
 import logging
 import struct
 from typing import Any, Protocol
@@ -96,12 +97,9 @@ class Sent:
 class VirtualWire:
     """Carries one frame at a time, to everybody but its sender."""
 
-    # every frame that was sent, also those that got lost
-    log: list[Sent] = field(default_factory=list)
-    # returns of a frame and its sender whether it gets lost
-    loses: Callable[[str, Frame], bool] = lambda sender, frame: False
-    # gives what arrives of a frame of a sender
-    alters: Callable[[str, Frame], Frame] = lambda sender, frame: frame
+    log: list[Sent] = field(default_factory=list)  # every frame, also those that got lost
+    loses: Callable[[str, Frame], bool] = lambda sender, frame: False  # whether one gets lost
+    alters: Callable[[str, Frame], Frame] = lambda sender, frame: frame  # what arrives of one
     refuses: str = ''  # why the interface of the master takes no frames, empty while it does
     _way: deque[tuple[float, str, Frame]] = field(default_factory=deque)
     _free_at: float = 0.0
@@ -392,26 +390,18 @@ class VirtualNetwork:
 
     def frames(self, cob_id: int, *, since: float = 0.0) -> list[bytes]:
         """Return the payloads of all frames of an identifier since a time."""
-        return [
-            sent.frame.data
-            for sent in self.wire.log
-            if sent.frame.can_id == cob_id and sent.time >= since
-        ]
+        sent = (each for each in self.wire.log if each.time >= since)
+        return [each.frame.data for each in sent if each.frame.can_id == cob_id]
 
     def controlwords(self, name: str, *, since: float = 0.0) -> list[int]:
         """Return the controlwords that the master sent to a drive, without repetitions."""
-        words = [
-            struct.unpack_from('<H', data)[0]
-            for data in self.frames(self._config.node(name).rpdos[0].cob_id, since=since)
-        ]
-        return [word for n, word in enumerate(words) if n == 0 or word != words[n - 1]]
+        frames = self.frames(self._config.node(name).rpdos[0].cob_id, since=since)
+        return [word for word, _ in groupby(struct.unpack_from('<H', data)[0] for data in frames)]
 
     def targets(self, name: str, *, since: float = 0.0) -> list[int]:
         """Return all values of 0x607A that the master sent to a drive in [inc]."""
-        return [
-            struct.unpack_from('<i', data)[0]
-            for data in self.frames(self._config.node(name).rpdos[1].cob_id, since=since)
-        ]
+        frames = self.frames(self._config.node(name).rpdos[1].cob_id, since=since)
+        return [struct.unpack_from('<i', data)[0] for data in frames]
 
     def reported(self, severity: Severity = Severity.INFO) -> list[str]:
         """Return what the master reported, of this severity and above."""
