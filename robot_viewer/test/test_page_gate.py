@@ -11,6 +11,7 @@ import gzip
 from http import HTTPStatus
 from http.client import BadStatusLine, HTTPConnection
 from pathlib import Path
+import re
 from typing import cast
 from urllib.parse import urlsplit
 
@@ -21,7 +22,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-from robot_viewer.page import gate
+from robot_viewer.page import client, gate
 from robot_viewer.page.gate import binding_problem, COOKIE, Gate, STOP_HEADER
 from robot_viewer.page.jog_panel import Actions
 from robot_viewer.page.live import Deadman, HEARTBEAT, Live, LIVE_PATH, RELEASED_AFTER
@@ -307,9 +308,21 @@ def test_the_page_has_stop_whether_it_is_packed_or_not(page: RobotPage) -> None:
         answer = connection.getresponse()
         assert answer.headers['Cache-Control'] == 'no-store'
         assert answer.headers['Content-Encoding'] == 'gzip'
-        assert gzip.decompress(answer.read()).decode() == get(page)[1]
+        text = gzip.decompress(answer.read()).decode()
+        assert text == get(page)[1]
+        found = re.search('"modulepreload" href="(/client-[0-9a-f]+.js)"', text)
+        assert found is not None, 'the program of viser is a file of its own'
+        assert text.count(found[1]) == 2
+        connection.close()
+        connection.request('GET', found[1])
+        answer = connection.getresponse()
+        assert answer.headers['Content-Type'] == 'text/javascript'
+        assert 'immutable' in answer.headers['Cache-Control']
+        assert b'createRoot' in gzip.decompress(answer.read())
     finally:
         connection.close()
+    other = b'<html><script data-p="">e.textContent=code</script></html>'
+    assert client.split(other) == (other, '', b''), 'one that is packed otherwise'
 
 
 @pytest.mark.parametrize('page', [EVERYWHERE], indirect=True)

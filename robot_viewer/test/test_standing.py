@@ -201,7 +201,7 @@ class Dog(ViewerRig):
         self._imu = node.create_publisher(Imu, 'imu', 10)
         self._battery = node.create_publisher(BatteryState, 'battery_state', 10)
         self._contacts = node.create_publisher(FootContacts, 'foot_contacts', 10)
-        self.sends_contacts = True
+        self.sends_contacts = self.sends_imu = True
         node.create_timer(0.05, self._publish)
         self._text.publish(String(data=URDF))
 
@@ -215,7 +215,8 @@ class Dog(ViewerRig):
         self._states.publish(JointState(name=list(LEGS), position=positions))
         x, y, z, w = multiply(from_rpy(0.1, 0.0, 0.0), from_rpy(math.pi, 0.0, 2.0))
         turned = Quaternion(x=x, y=y, z=z, w=w)
-        self._imu.publish(Imu(header=Header(frame_id='imu_link'), orientation=turned))
+        if self.sends_imu:
+            self._imu.publish(Imu(header=Header(frame_id='imu_link'), orientation=turned))
         self._battery.publish(BatteryState(percentage=0.75, voltage=7.4))
         if self.sends_contacts:
             names = [f'{leg}_foot' for leg in LEGS]
@@ -246,7 +247,13 @@ def test_the_page_shows_how_it_stands(dog: Dog) -> None:
     turn, place = dog.poses[0].orientation, dog.poses[0].position
     assert roll_pitch((turn.x, turn.y, turn.z, turn.w)) == pytest.approx((0.1, 0.2))
     assert (place.x, place.y, place.z) == (0.0, 0.0, -0.01)
+    assert not any(slider.disabled for slider in dog.body._sliders)
     dog.viewer.page._stop()
+    dog.spin_until(lambda: all(slider.disabled for slider in dog.body._sliders), 'no motion')
+    dog.sends_imu = False
+    dog.spin_until(lambda: 'attitude unknown' in dog.body._html.content, 'its end')
+    assert 'battery unknown' in dog.body._html.content
+    assert 'feet on the ground: unknown' in dog.body._html.content
 
 
 def test_a_machine_without_the_messages_shows_the_rest(

@@ -33,6 +33,7 @@ from urdf_reader import (
     Vector,
 )
 from viser import (
+    GuiButtonHandle,
     GuiEvent,
     GuiSliderHandle,
     IcosphereHandle,
@@ -41,12 +42,12 @@ from viser import (
 
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import feet_of, FOOT, LEAST_FEET
-from ..page.style import NEUTRAL, value_of
+from ..page.style import add_button, THREE_COLUMNS, value_of
 from .listening import Listening
 
 NOT_MEASURED = -1.0  # first covariance element of a quantity that is not measured (REP 145)
 CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
-CONTACTS_AGE = 1.0  # age in [s] above which foot contacts are no longer shown
+FRESH = 1.0  # age in [s] above which attitude and foot contacts are unknown
 LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
 """Slider ranges, symmetric about zero; the controller has its own limits."""
@@ -74,6 +75,7 @@ class Body:
         self._feet: tuple[str, ...] = ()
         self.offered = False  # on the page
         self._attitude: Quaternion | None = None
+        self._attitude_at = 0.0
         self._mounted: dict[str, Quaternion] = {}  # link rotations in the root link at zero
         self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
@@ -86,6 +88,7 @@ class Body:
         self._path = ''  # of the root link in the scene
         self._seen = True
         self._sliders: list[GuiSliderHandle[float]] = []
+        self._level: GuiButtonHandle | None = None
         self._foot_marks: dict[str, IcosphereHandle] = {}
         self._mass: IcosphereHandle | None = None
         self._line: LineSegmentsHandle | None = None
@@ -144,7 +147,7 @@ class Body:
         """Remove the markers from the view; the page removes the groups."""
         for mark in self._marks:
             mark.remove()
-        self._mass = self._line = None
+        self._mass = self._line = self._level = None
         self._foot_marks, self._sliders = {}, []
         self._seen, self.offered = True, False
 
@@ -167,11 +170,12 @@ class Body:
             self.send((0.0, 0.0, 0.0))
 
         with self._folder:
+            gui.add_html(THREE_COLUMNS)
             for label, most in RANGES.items():
                 slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
                 slider.on_update(moved)
                 self._sliders.append(slider)
-            gui.add_button(LEVEL_LABEL, color=NEUTRAL).on_click(lambda _: level())
+            self._level = add_button(gui, LEVEL_LABEL, level)
 
     def send(self, pose: Pose) -> None:
         """Publish a body pose once, immediately; the controller moves there slowly."""
@@ -185,7 +189,7 @@ class Body:
         """Update the foot contacts in the view."""
         if not self.offered or self._tree is None:
             return
-        if time.monotonic() - self._contacts_at > CONTACTS_AGE:
+        if time.monotonic() - self._contacts_at > FRESH:
             self._contacts = None
         poses = link_poses(self._tree, self._positions)
         places = {foot: poses[foot].translation for foot in self._feet}
@@ -205,12 +209,20 @@ class Body:
         self._show_support(found)
 
     def list(self) -> None:
-        """Update attitude and battery on the page."""
-        if self.offered:
-            html = horizon_html(self._attitude, self.battery)
-            if self._contacts is not None and self._support is not None:
-                html += self._contacts.html(self._support)
-            self._html.content = html
+        """Update attitude, battery and feet on the page, and what may be set."""
+        if not self.offered:
+            return
+        known = time.monotonic() - self._attitude_at < FRESH
+        html = horizon_html(self._attitude, self.battery, known=known)
+        if self._contacts is not None and self._support is not None:
+            html += self._contacts.html(self._support)
+        elif CONTACTS in self._found:  # the lines below stay in their places
+            html += lines_html('feet on the ground: unknown', '', '')
+        self._html.content = html
+        live = self._page.live
+        if self._level is not None:
+            for each in (*self._sliders, self._level):
+                each.disabled = live.stopped or not live.movable
 
     @property
     def _marks(self) -> Sequence[IcosphereHandle | LineSegmentsHandle]:
@@ -262,6 +274,7 @@ class Body:
         turn = message.orientation
         measured = message.orientation_covariance[0] != NOT_MEASURED
         self._attitude = (turn.x, turn.y, turn.z, turn.w) if measured else None
+        self._attitude_at = time.monotonic()
         mounted = self._mounted.get(message.header.frame_id)
         if self._attitude is not None and mounted is not None:
             x, y, z, w = mounted
@@ -302,10 +315,7 @@ class Contacts:
         else:
             inside = 'inside' if margin >= 0.0 else 'outside'
             stable = f'centre of mass {abs(margin) * 1e3:.0f} mm {inside} the support'
-        return (
-            f'<div style="margin:0.3em 1em"><div>feet on the ground: {escape(names)}</div>'
-            f'<div>{stable}</div><div style="opacity:0.7">{escape(source)}</div></div>'
-        )
+        return lines_html(f'feet on the ground: {names}', stable, source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -372,25 +382,37 @@ def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
     return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)
 
 
-def horizon_html(attitude: Quaternion | None, battery: str) -> str:
-    """Return HTML of an artificial horizon with its angles, and the battery, where measured."""
+def lines_html(*texts: str) -> str:
+    """Return HTML of lines; an empty one takes its place, too."""
+    lines = ''.join(f'<div>{escape(text) or "&nbsp;"}</div>' for text in texts)
+    return f'<div style="margin:0.3em 1em">{lines}</div>'
+
+
+def horizon_html(attitude: Quaternion | None, battery: str, *, known: bool = True) -> str:
+    """Return HTML of an artificial horizon with its angles, and the battery, where measured.
+
+    ``known`` is whether the last attitude is recent; else it is grey, and both are unknown.
+    """
+    known |= attitude is None
     parts = []
     if attitude is not None:
         roll, pitch = (math.degrees(angle) for angle in roll_pitch(attitude))
         # one pixel per degree; the horizon rises when the nose goes down
         parts.append(
-            '<svg viewBox="-40 -40 80 80" width="110" height="110" style="border-radius:50%">'
+            '<svg viewBox="-40 -40 80 80" width="110" height="110"'
+            f' style="border-radius:50%;filter:grayscale({0 if known else 1})">'
             f'<g transform="rotate({-roll:.1f}) translate(0 {-pitch:.1f})">'
             '<rect x="-90" y="-180" width="180" height="180" fill="#74c0fc"/>'
             '<rect x="-90" y="0" width="180" height="180" fill="#b08968"/>'
             '<line x1="-90" x2="90" stroke="#fff" stroke-width="1.5"/></g>'
             '<path d="M-24 0h16l8 7 8-7h16" fill="none" stroke="#212529" stroke-width="2.5"/>'
             '</svg>'
-            f'<div>roll {roll:+.1f}°, pitch {pitch:+.1f}°</div>'
         )
+        parts.append(f'roll {roll:+.1f}°, pitch {pitch:+.1f}°' if known else 'attitude unknown')
     if battery:
-        parts.append(f'<div>battery {escape(battery)}</div>')
-    return f'<div style="margin:0.3em 1em">{"".join(parts)}</div>'
+        parts.append(f'battery {escape(battery if known else "unknown")}')
+    lines = ''.join(f'<div>{part}</div>' for part in parts)
+    return f'<div style="margin:0.3em 1em">{lines}</div>'
 
 
 def battery_text(percentage: float, voltage: float) -> str:

@@ -39,6 +39,7 @@ from websockets.exceptions import InvalidMessage
 from websockets.http11 import Request, Response
 
 from ..robot_state import Stop
+from . import client
 from .live import Live, LIVE_PATH
 
 LOOPBACK_NAMES = frozenset({'localhost', 'ip6-localhost', 'ip6-loopback'})
@@ -140,6 +141,7 @@ class Gate:
         self._stop, self._live = stop, live
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
         self._page = b''  # viser's page with the overlay
+        self._client_path, self._client = '', b''
         self.token = '' if is_loopback(host) else _lasting_token()
         self._serving = False
 
@@ -222,6 +224,8 @@ class Gate:
             raise CancelledError  # the browser is gone; websockets could not answer
         if answer is not None or next_one is None:
             return answer
+        if self._client and request.path == self._client_path:
+            return client.response(self._client)
         result = next_one(connection, request)
         if isawaitable(result):
             result = await result
@@ -256,7 +260,8 @@ class Gate:
             before, end, after = body.rpartition(END)
             if not end:
                 raise RuntimeError('the page has no </body>: STOP has no place on it')
-            self._page = gzip.compress(before + self._html + end + after)
+            page, self._client_path, self._client = client.split(before + self._html + end + after)
+            self._page = gzip.compress(page)
         body = self._page if packed else gzip.decompress(self._page)
         headers = Headers(response.headers.raw_items())
         headers['Cache-Control'] = 'no-store'  # a cache may hold a page without STOP

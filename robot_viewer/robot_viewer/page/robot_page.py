@@ -259,7 +259,8 @@ class RobotPage:
         return self.robot.notes
 
     def _camera(self, view: str) -> Velocity:
-        size = self.robot.size + 0.4 if self.robot is not None else 1.0
+        reach = self.robot.size if self.robot is not None else 0.6
+        size = min(reach + 0.4, max(1.7 * reach, 0.3))
         x, y, z = VIEWS[view][1]
         return x * size, y * size, z * size
 
@@ -446,9 +447,9 @@ class RobotPage:
                     color = BUTTON_COLORS.get(mode, NEUTRAL)
                     self._modes[mode] = add_button(gui, label, partial(self._request, mode), color)
                 self._modes['policy'].visible = policy
-                add_choice(gui, 'Gait', GAITS, lambda gait: self._request(f'gait:{gait}'))
             with gui.add_folder('Hold to walk'):
                 gui.add_html(pad(holds[:WALK_BUTTONS]) + pad(holds[WALK_BUTTONS:], 'rv-keyed'))
+                add_choice(gui, 'Gait', GAITS, lambda gait: self._request(f'gait:{gait}'))
 
     # -- what people do, in threads of the page
 

@@ -31,7 +31,7 @@ Mark: TypeAlias = tuple[str, str]
 
 GOOD: Mark = ('✓', '#237032')
 WARNING: Mark = ('⚠', '#8a6100')
-BAD: Mark = ('⛔', '#c92a2a')
+BAD: Mark = ('✖', '#c92a2a')
 UNKNOWN: Mark = ('?', '#495057')
 PLAIN: Mark = ('·', '#495057')
 """Meaning of a line: icon and color, since not everyone can see a color alone."""
