@@ -12,7 +12,7 @@ from http import HTTPStatus
 from http.client import BadStatusLine, HTTPConnection
 from pathlib import Path
 import re
-from typing import cast
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 from hypothesis import given
@@ -28,12 +28,6 @@ from robot_viewer.page.jog_panel import Actions
 from robot_viewer.page.live import Deadman, HEARTBEAT, Live, LIVE_PATH, RELEASED_AFTER
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.robot_state import Stop
-
-
-def test_a_held_button_counts_from_the_first_heartbeat_on() -> None:
-    """Each one, as the browser's timer makes them."""
-    deadman = Deadman()
-    assert all(deadman.beat(1, 'hold', 10.0 + number * HEARTBEAT) for number in range(50))
 
 
 @given(st.integers(2, 200), st.floats(0.0, 60.0))
@@ -63,26 +57,6 @@ def test_one_page_at_a_time(steps: list[tuple[int, float, bool]]) -> None:
         assert deadman.holder == (holder or None)
 
 
-def test_a_page_that_is_closed_has_no_control() -> None:
-    """Another one has it with its first heartbeat."""
-    deadman = Deadman()
-    assert deadman.beat(1, 'hold', 10.0)
-    assert not deadman.beat(2, 'hold', 20.0)
-    deadman.leave(1)
-    assert not deadman.beat(2, 'hold', 20.1)  # it was refused: under a finger that waits
-    deadman.release(2, 'hold', 20.2)
-    assert deadman.beat(2, 'hold', 20.3)
-
-
-def test_a_press_that_may_not_move_anything_has_to_be_made_anew() -> None:
-    """What it was refused for may end while it is held."""
-    deadman = Deadman()
-    deadman.bar(1, 'hold')
-    assert not deadman.beat(1, 'hold', 10.0)
-    deadman.release(1, 'hold', 10.1)
-    assert deadman.beat(1, 'hold', 10.2)
-
-
 @given(
     st.integers(1, 90),
     st.lists(st.tuples(st.sampled_from([1, 2]), st.floats(HEARTBEAT, 9.0)), max_size=60),
@@ -106,36 +80,65 @@ def test_after_a_stop_a_button_has_to_be_pressed_anew(
     assert not deadman.beat(2, 'hold', now + RELEASED_AFTER)
 
 
-def test_a_button_that_nobody_held_counts_after_a_stop_at_once() -> None:
-    """It was let go before; what is late of it does not count."""
-    deadman = Deadman()
-    assert deadman.beat(1, 'hold', 10.0)
-    deadman.release(1, 'hold', 10.1)
-    assert not deadman.beat(1, 'hold', 10.1 + 0.1 * HEARTBEAT)
-    deadman.stop()
-    assert deadman.beat(1, 'hold', 11.0)
-
-
-def test_a_button_that_was_taken_off_the_page_bars_no_other() -> None:
-    """Its page cannot let it go any more; the one that came in its place was never held."""
-    deadman = Deadman()
-    assert deadman.beat(1, 'hold', 10.0)
-    deadman.stop()
-    assert not deadman.beat(1, 'hold', 11.0)
-    assert deadman.beat(1, 'its successor', 11.0)
-
-
-def test_a_press_whose_work_has_ended_is_held_no_more() -> None:
-    """Its heartbeats go on under a finger that has not seen it; it has to be pressed anew."""
-    deadman = Deadman()
-    assert deadman.beat(1, 'hold', 10.0)
-    deadman.end('another')
-    assert deadman.held(10.0)
-    deadman.end('hold')
-    assert not deadman.held(10.0)
-    assert not deadman.beat(1, 'hold', 10.1)
-    deadman.release(1, 'hold', 10.2)
-    assert deadman.beat(1, 'hold', 10.3)
+@pytest.mark.parametrize(
+    'steps',
+    [
+        # each heartbeat, as the browser's timer makes them
+        [('beat', 1, 'hold', HEARTBEAT, True)] * 50,
+        # a page that is closed has no control; what was refused waits under a finger
+        [
+            ('beat', 1, 'hold', 1.0, True),
+            ('beat', 2, 'hold', 1.0, False),
+            ('leave', 1),
+            ('beat', 2, 'hold', 1.0, False),
+            ('release', 2, 'hold', 1.0),
+            ('beat', 2, 'hold', 1.0, True),
+        ],
+        # a press that may not move anything is made anew: its reason may end while it is held
+        [
+            ('bar', 1, 'hold'),
+            ('beat', 1, 'hold', 1.0, False),
+            ('release', 1, 'hold', 1.0),
+            ('beat', 1, 'hold', 1.0, True),
+        ],
+        # one that was let go before a stop counts at once; what is late of it does not
+        [
+            ('beat', 1, 'hold', 1.0, True),
+            ('release', 1, 'hold', 1.0),
+            ('beat', 1, 'hold', 0.1 * HEARTBEAT, False),
+            ('stop',),
+            ('beat', 1, 'hold', 1.0, True),
+        ],
+        # one that was taken off the page, and let go by nobody, bars none that comes in its place
+        [
+            ('beat', 1, 'hold', 1.0, True),
+            ('stop',),
+            ('beat', 1, 'hold', 1.0, False),
+            ('beat', 1, 'its successor', 1.0, True),
+        ],
+        # one whose work has ended is held no more
+        [
+            ('beat', 1, 'hold', 1.0, True),
+            ('end', 'another'),
+            ('held', 0.1, True),
+            ('end', 'hold'),
+            ('held', 0.0, False),
+            ('beat', 1, 'hold', 1.0, False),
+            ('release', 1, 'hold', 1.0),
+            ('beat', 1, 'hold', 1.0, True),
+        ],
+    ],
+)
+def test_which_heartbeats_count(steps: list[tuple[Any, ...]]) -> None:
+    """Each step is a call, with the time since the last one in [s], and what it returns."""
+    deadman, now = Deadman(), 10.0
+    for name, *values in steps:
+        expected = values.pop() if name in {'beat', 'held'} else None
+        if name in {'beat', 'held', 'release'}:
+            now += values.pop()
+            values.append(now)
+        answer = getattr(deadman, name)(*values)
+        assert expected in {None, answer}, (name, values)
 
 
 TIMEOUT = 10.0  # [s]
@@ -210,16 +213,9 @@ def cookie_of(page: RobotPage) -> dict[str, str]:
     if not query:
         return {}
     status, _, cookie = get(page, f'/?{query}')
-    assert status == 303
+    # a link of another site opens the page; requests that it makes itself have no cookie
+    assert (status, 'SameSite=Lax' in cookie) == (303, True)
     return {'Cookie': cookie.partition(';')[0]}
-
-
-def test_the_printed_url_opens_the_page(page: RobotPage) -> None:
-    """And what it loads afterwards."""
-    status, text, _ = get(page, **cookie_of(page))
-    assert status == 200
-    assert '<html' in text
-    assert 'robot-stop' in text
 
 
 def test_stop_is_for_those_who_may_open_the_page(page: RobotPage, actions: Nothing) -> None:
@@ -275,28 +271,25 @@ def test_two_pages_of_one_host_and_one_that_is_started_again(actions: Nothing) -
             assert get(again, '/stop', Cookie=jar, **header)[0] == 200
 
 
-@pytest.mark.parametrize('host', [EVERYWHERE, '::', '::1', '127.0.0.2'])
+@pytest.mark.parametrize('host', ['127.0.0.1', EVERYWHERE, '::', '::1', '127.0.0.2'])
 def test_the_url_of_any_binding_opens_the_page(actions: Nothing, host: str) -> None:
     """It names an address of this computer, not the one that stands for all."""
     if ':' in host and binding_problem(host):
         pytest.skip('this computer has no IPv6')
     with closing(RobotPage(host, 8300, cast(Actions, actions))) as page:
         status, text, _ = get(page, **cookie_of(page))
-        assert (status, '<html' in text) == (200, True)
+        assert (status, '<html' in text, 'robot-stop' in text) == (200, True, True)
         assert urlsplit(page.url).hostname not in {EVERYWHERE, '::'}
 
 
 @pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
-@pytest.mark.parametrize('host', ['127.0.0.2', 'ip6-localhost', '[::1]', 'localhost'])
-def test_each_name_of_this_host_opens_the_page(page: RobotPage, host: str) -> None:
-    """As /etc/hosts of Debian has them, and the addresses of 127.0.0.0/8."""
-    assert get(page, Host=f'{host}:{urlsplit(page.url).port}')[0] == 200
-
-
-@pytest.mark.parametrize('page', [EVERYWHERE], indirect=True)
-def test_a_link_of_another_site_opens_the_page(page: RobotPage) -> None:
-    """The cookie comes with the request that follows; not with those that the site makes."""
-    assert 'SameSite=Lax' in get(page, f'/?{urlsplit(page.url).query}')[2]
+def test_each_name_of_this_host_opens_the_page_and_no_other(page: RobotPage) -> None:
+    """As Debian's /etc/hosts has them, and 127.0.0.0/8; not one that was pointed here (DNS)."""
+    port = urlsplit(page.url).port
+    for host in ('127.0.0.2', 'ip6-localhost', '[::1]', 'localhost'):
+        assert get(page, Host=f'{host}:{port}')[0] == 200, host
+    status, text, _ = get(page, Host=f'evil.example:{port}')
+    assert (status, 'for this host only' in text) == (403, True)
 
 
 @pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
@@ -333,14 +326,6 @@ def test_a_page_that_is_open_to_others_needs_its_token(page: RobotPage, query: s
     status, text, cookie = get(page, f'/{query}', Cookie=wrong)
     assert (status, cookie) == (403, '')
     assert 'by the URL that was printed' in text
-
-
-@pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
-def test_a_name_that_was_pointed_to_this_host_opens_nothing(page: RobotPage) -> None:
-    """DNS rebinding: the browser takes the page for one of elsewhere."""
-    status, text, _ = get(page, Host=f'evil.example:{urlsplit(page.url).port}')
-    assert status == 403
-    assert 'for this host only' in text
 
 
 @pytest.mark.parametrize('path', ['', LIVE_PATH])

@@ -10,7 +10,6 @@ from concurrent.futures import Future
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib import import_module
-from itertools import cycle
 import math
 import socket
 import sys
@@ -343,7 +342,10 @@ def test_who_does_not_look_takes_no_messages(
 
 
 def test_each_message_between_two_pictures_counts(robot: Robot, opened: list[bool]) -> None:
-    """Of two that come together the joints of both are shown, and the first motion of the root."""
+    """Of two that come together the joints of both are shown, and where the root is.
+
+    Its place comes among those of its links, which are more, and behind that of its map.
+    """
     assert opened
     robot.spin_until(lambda: bool(robot.node.count_subscribers('/tf')), 'subscriptions')
     states = robot.node.create_publisher(JointState, 'joint_states', 10)
@@ -356,34 +358,17 @@ def test_each_message_between_two_pictures_counts(robot: Robot, opened: list[boo
         robot.spin_until(lambda: robot.viewer._root == '0', 'the robot')
         for joint in 'ab':
             states.publish(JointState(name=[joint], position=[x]))
-        for child in '01':
+        for child in '1201':
             frame = TransformStamped(child_frame_id=child)
             frame.transform.translation.x = x
-            frames.publish(TFMessage(transforms=[frame]))
+            odom = TransformStamped(child_frame_id='odom')
+            frames.publish(TFMessage(transforms=[odom, frame]))
 
         def is_shown(x: float = x) -> bool:
             viewer = robot.viewer
             return viewer._drawn == {'a': x, 'b': x} and viewer._shown_base.translation[0] == x
 
         robot.spin_until(is_shown, f'{x} rad and m')
-
-
-def test_a_robot_that_walks_is_shown_where_it_is(robot: Robot, opened: list[bool]) -> None:
-    """Its place comes among those of its links, which are more, and behind that of its map."""
-    assert opened
-    robot.description.publish(String(data=TWO_SLIDERS))
-    publisher = robot.node.create_publisher(TFMessage, '/tf', 10)
-    children = cycle('120')
-    for x in (0.25, 0.5):
-
-        def is_shown(x: float = x) -> bool:
-            frame = TransformStamped(child_frame_id=next(children))
-            frame.transform.translation.x = x
-            odom = TransformStamped(child_frame_id='odom')
-            publisher.publish(TFMessage(transforms=[odom, frame]))
-            return robot.viewer._shown_base.translation[0] == x
-
-        robot.spin_until(is_shown, f'{x} m')
 
 
 def test_each_heartbeat_is_one_command(robot: Robot) -> None:
@@ -597,16 +582,9 @@ def test_after_stop_the_page_moves_nothing_until_that_is_allowed(robot: Robot) -
     robot.spin_until(lambda: answers[-1].startswith('STOP NOT CONFIRMED: '), 'no confirmation')
 
 
-def test_a_request_that_no_service_serves_is_refused(robot: Robot, said: list[str]) -> None:
-    """A drive may lack what another one has; it does not run for ever."""
-    answers: list[bool] = []
-    robot.viewer._triggers.call_all('Home joint1', [], answers.append)
-    assert said == ['Home joint1: is not offered']
-    assert answers == [False]
-    assert not robot.viewer._triggers.running
-
-
-def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) -> None:
+def test_the_action_calls_one_group_of_services_after_the_other(
+    robot: Robot, said: list[str]
+) -> None:
     """Enabling is init and the mode; a refusal ends it, and is the answer."""
     statuses = robot.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
     for verb in ('init', 'cyclic_position_mode'):
@@ -640,6 +618,11 @@ def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) ->
         robot.spin_until(partial(robot.has_called, called), 'calls')
         robot.spin_until(lambda: not robot.viewer._judge._acting, 'the end')
         robot.calls.clear()
+    answered: list[bool] = []
+    robot.viewer._triggers.call_all('Home joint1', [], answered.append)
+    assert answered == [False], 'a drive may lack what another one has'
+    assert said[-1] == 'Home joint1: is not offered'
+    assert not robot.viewer._triggers.running
 
 
 def targets_of(robot: Robot) -> tuple[list[Any], Controller, TargetPanel]:
