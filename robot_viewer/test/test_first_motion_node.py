@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from html import unescape
 import math
 import re
@@ -378,21 +379,9 @@ class Robot:
         """Prepare a motion."""
         self.motion.prepare(REQUEST)
         assert self.calls[-1][0].endswith('read_units')
-        self.calls[-1][1].answer(
-            scale_from_factor_group=False,
-            scale_pos_to_dev=1e4,
-            scale_pos_from_dev=1e-4,
-            scale_vel_to_dev=1e4,
-            scale_vel_from_dev=1e-4,
-            scale_eff_to_dev=1.0,
-            scale_eff_from_dev=1.0,
-            offset_pos_from_dev=0.0,
-            gear=0.0,
-            factor_scale=0.0,
-            bus_config='/none/bus.yml',
-            device=REQUEST.joint,
-            channel=-1,
-        )
+        units: dict[str, Any] = asdict(AXIS.scales) | {'gear': 0.0, 'factor_scale': 0.0}
+        units |= {'bus_config': '/none/bus.yml', 'device': REQUEST.joint, 'channel': -1}
+        self.calls[-1][1].answer(**units)
         self.answer('enable')
         self.look(RELEASED_AFTER + 2 * PERIOD)
 

@@ -108,7 +108,6 @@ class Robot(Node):
     """What the bridge meets, served in a thread of its own."""
 
     def __init__(self) -> None:
-        """Publish."""
         super().__init__('robot')
         self.changed = threading.Condition()
         self.states = self.create_publisher(JointState, 'joint_states', 10)

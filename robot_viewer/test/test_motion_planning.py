@@ -208,7 +208,6 @@ class Server:
     """An action whose goals end when the test says so, or when they are canceled."""
 
     def __init__(self, node: Node, action: Any, name: str) -> None:
-        """Offer it."""
         self.action = action
         self.goals: list[Goal] = []
         self.canceled: list[Goal] = []
@@ -245,7 +244,6 @@ class Planner(ViewerRig):
     """What the page takes for a move_group, and a robot."""
 
     def __init__(self) -> None:
-        """Offer it, with the page beside it."""
         node = Node('move_group')
         super().__init__(node)
         self.objects: dict[str, SceneObject] = {}
@@ -281,7 +279,7 @@ class Planner(ViewerRig):
 
     def do(self, action: str, *arguments: Any, **options: Any) -> None:
         """Do it as a button of the page does."""
-        plan = self.viewer._planning
+        plan = self.panel
         actor = plan if hasattr(plan, action) else plan.scene
         if action in {'execute', 'go_on'} and not arguments:
             arguments = (time.monotonic(),)
@@ -431,7 +429,7 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
     planner.do('execute')
     planner.viewer.actions.stop()  # in the same turn
     planner.spin_until(lambda: len(planner.execute.canceled) == 2, 'a cancel')
-    planner.spin_until(lambda: not planner.viewer._planning.busy, 'its end')
+    planner.spin_until(lambda: not planner.panel.busy, 'its end')
     planner.plan()
     planner.viewer.actions.stop()
     planner.do('execute')  # it came late
@@ -468,7 +466,7 @@ def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, ho
 @pytest.mark.scenario
 def test_a_move_group_that_has_gone_ends_the_press_and_its_reasons(planner: Planner) -> None:
     """Why its execution was canceled is no reason of the next one's failure."""
-    plan, live = planner.viewer._planning, planner.viewer.page.live
+    plan, live = planner.panel, planner.viewer.page.live
     planner.plan()
     planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
@@ -507,7 +505,7 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     last = planner.asked[-1]
     assert (last.ik_link_name, last.pose_stamped.header.frame_id) == ('wheel', 'base')
     assert last.pose_stamped.pose.position.x == 0.5
-    planning = planner.viewer._planning
+    planning = planner.panel
     planner.spin_until(lambda: planning._pose is None, 'a solution')
     planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 1, 'a goal')
@@ -529,29 +527,26 @@ def test_boxes_come_move_and_go(planner: Planner) -> None:
     planner.do('add_box', (0.1, 0.2, 0.4))
     planner.spin_until(lambda: 'box1' in planner.objects, 'a box')
     assert planner.objects['box1'].pose.translation[2] == pytest.approx(0.2), 'on the ground'
-    planner.spin_until(lambda: planner.viewer._planning.scene.chosen.value == 'box1', 'the choice')
-    assert planner.viewer._planning.scene.gizmo is not None
+    planner.spin_until(lambda: planner.panel.scene.chosen.value == 'box1', 'the choice')
+    assert planner.panel.scene.gizmo is not None
     planner.do('drag', Transform((1.0, 0.0, 0.0)), is_last=False)
     planner.do('drag', Transform((2.0, 0.0, 0.0)), is_last=True)
     planner.spin_until(lambda: 'is moved' in planner.said, 'a move')
     assert planner.objects['box1'].pose.translation[0] == 2.0
     planner.do('add_box', (0.1, 0.2, 0.4))
-    planner.spin_until(lambda: planner.viewer._planning.scene.chosen.value == 'box2', 'the choice')
+    planner.spin_until(lambda: planner.panel.scene.chosen.value == 'box2', 'the choice')
     planner.do('show_objects', False)
-    drawn = planner.viewer._planning.scene._drawn
+    drawn = planner.panel.scene._drawn
     planner.spin_until(lambda: not any(each.visible for _, each in drawn.values()), 'no object')
     planner.do('choose', 'box1')
     planner.do('remove_chosen')
     planner.spin_until(lambda: set(planner.objects) == {'box2'}, 'the end of it')
-    planner.spin_until(
-        lambda: planner.viewer._planning.scene.chosen.options == ('none', 'box2'), 'the list'
-    )
-    assert planner.viewer._planning.scene.gizmo is None
+    scene = planner.panel.scene
+    planner.spin_until(lambda: scene.chosen.options == ('none', 'box2'), 'the list')
+    assert scene.gizmo is None
     planner.grasp('part')
-    planner.spin_until(lambda: 'part' in planner.viewer._planning.scene._objects, 'what it holds')
-    objects = planner.viewer._planning.scene._objects
-    assert {name: each.attached for name, each in objects.items()} == {'box2': False, 'part': True}
+    planner.spin_until(lambda: 'part' in scene._objects, 'what it holds')
+    attached = {name: each.attached for name, each in scene._objects.items()}
+    assert attached == {'box2': False, 'part': True}
     planner.grasp('')
-    planner.spin_until(
-        lambda: 'part' not in planner.viewer._planning.scene._objects, 'it let that go'
-    )
+    planner.spin_until(lambda: 'part' not in scene._objects, 'it let that go')

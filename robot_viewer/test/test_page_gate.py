@@ -149,7 +149,6 @@ class Nothing:
     """Counts what stops; nothing else is asked for."""
 
     def __init__(self) -> None:
-        """Begin with none, and a robot that has stopped."""
         self.stops = 0
         self.answer: Stop | None = Stop(stands=True, text='stopped: all')
 

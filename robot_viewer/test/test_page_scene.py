@@ -204,22 +204,17 @@ def test_what_cannot_be_shown_is_named_and_the_rest_is_there(server: ViserServer
 
 
 @pytest.mark.parametrize(
-    ('mesh', 'content', 'note'),
-    [
-        ('a.stl', b'solid nothing', 'finger: '),
-        ('a.obj', b'f 1 2 3', 'finger: '),
-        ('a.dae', b'<COLLADA', 'finger: '),
-        ('a.xyz123', b'', 'finger: '),
-    ],
+    ('mesh', 'content'),
+    [('a.stl', 'solid nothing'), ('a.obj', 'f 1 2 3'), ('a.dae', '<COLLADA'), ('a.xyz123', '')],
 )
 def test_a_mesh_that_no_reader_takes_is_named(
-    server: ViserServer, tmp_path: Path, mesh: str, content: bytes, note: str
+    server: ViserServer, tmp_path: Path, mesh: str, content: str
 ) -> None:
     """Whatever its reader raises: the rest of the robot is there."""
-    (tmp_path / mesh).write_bytes(content)
+    (tmp_path / mesh).write_text(content)
     scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=tmp_path / mesh)))
     (found,) = scene.notes
-    assert found.startswith(note)
+    assert found.startswith('finger: ')
 
 
 COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

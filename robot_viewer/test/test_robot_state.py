@@ -143,97 +143,52 @@ def legs(level: int, state: str, message: str = '') -> Status:
     return Status('controller_node: state', level, message or state, values)
 
 
+STOOD, REFUSED = Stop('stopped: j1. stand: j2', stands=True), Stop('no', stands=False)
+BUS_OFF = Status('master: bus', 2, 'bus off')
+CAMERA = Status('camera: frames', 2, 'no frames')
+WAITS = legs(3, 'relax', 'waiting for /joint_states')
+NO_CONTACT = 'NO CONTACT WITH THE ROBOT'
+
+
 @pytest.mark.parametrize(
-    ('seen', 'word', 'part', 'action', 'calls'),
+    ('changes', 'word', 'part', 'action', 'calls'),
     [
-        (Seen(), 'NO ROBOT', 'Start one', '', 0),
-        (replace(ROBOT, silence=12.0), 'NO CONTACT WITH THE ROBOT', 'for 12 s. STOP may', '', 0),
-        (replace(ROBOT, statuses=[OLD]), 'NO CONTACT WITH THE ROBOT', 'unknown for 9 s', '', 0),
-        (
-            replace(ROBOT, statuses=[FAULT], stop=Stop('x', stands=True)),
-            'FAULT',
-            'j1: 0x2310 over current. Remove the cause, then recover.',
-            'Recover j1',
-            1,
-        ),
-        (replace(ROBOT, statuses=[FAULT, OTHER_FAULT]), 'FAULT (2)', 'j1: ', 'Recover all 2', 2),
-        (replace(ROBOT, statuses=[LOST]), 'FAULT', 'offline', 'Recover j1', 1),
-        (replace(ROBOT, statuses=[FAULT], acting='Recover j1'), 'FAULT', 'Recover j1 ...', '', 0),
-        (replace(ROBOT, statuses=[BOOTS]), 'NOT ENABLED', 'j1: offline, configuring.', '', 0),
-        (
-            replace(ROBOT, statuses=[GOOD, Status('master: bus', 2, 'bus off')]),
-            'FAULT',
-            'master: bus: bus off',
-            '',
-            0,
-        ),
-        (
-            replace(ROBOT, statuses=[GOOD, Status('camera: frames', 2, 'no frames')]),
-            'READY',
-            'Hold a button to move. camera: frames reports an error: no frames.',
-            '',
-            0,
-        ),
-        (replace(ROBOT, stop=Stop()), 'STOPPING', 'not confirmed yet', ALLOW, 0),
-        (
-            replace(ROBOT, stop=Stop('no', stands=False)),
-            'STOP NOT CONFIRMED',
-            'use the emergency stop. no',
-            ALLOW,
-            0,
-        ),
-        (
-            replace(ROBOT, stop=Stop('stopped: j1. stand: j2', stands=True)),
-            'STOPPED',
-            'Stopped: j1; the others stand. Nothing moves from this page',
-            ALLOW,
-            0,
-        ),
-        (
-            replace(ROBOT, stop=Stop('stopped', stands=True), moving=True),
-            'MOVING',
-            'A program moves it after STOP',
-            ALLOW,
-            0,
-        ),
-        (
-            replace(ROBOT, statuses=[OLD, OTHER_FAULT]),
-            'NO CONTACT WITH THE ROBOT',
-            'use the emergency stop. j2 is faulty.',
-            '',
-            0,
-        ),
-        (replace(ROBOT, statuses=[OFF]), 'NOT ENABLED', '1 of 1 drives', 'Enable j1', 2),
-        (replace(ROBOT, statuses=[NO_MODE]), 'NOT ENABLED', 'no mode', 'Select the mode', 1),
-        (replace(ROBOT, limit='j2 is at its end'), 'AT A LIMIT', 'J2 is at its end.', '', 0),
-        (replace(ROBOT, moving=True), 'MOVING', 'A program moves it.', '', 0),
-        (ROBOT, 'READY', 'Hold a button to move.', '', 0),
-        (replace(ROBOT, statuses=[]), 'READY', 'no drives', '', 0),
-        (replace(ROBOT, statuses=[legs(0, 'stand')]), 'STANDING', 'Press Walk', '', 0),
-        (replace(ROBOT, statuses=[legs(0, 'walk')]), 'READY', 'Hold an arrow', '', 0),
-        (
-            replace(ROBOT, statuses=[legs(0, 'walk')], moving=True),
-            'WALKING',
-            'A program',
-            '',
-            0,
-        ),
-        (replace(ROBOT, statuses=[legs(1, 'lie', 'low')]), 'LYING', 'low.', '', 0),
-        (replace(ROBOT, statuses=[legs(0, 'to stand')]), 'MOVING', 'Mode to stand.', '', 0),
-        (replace(ROBOT, statuses=[legs(2, 'fault', 'fell')]), 'FAULT', 'fell.', 'Clear fault', 1),
-        (
-            replace(ROBOT, statuses=[legs(3, 'relax', 'waiting for /joint_states')]),
-            'NO CONTACT WITH THE ROBOT',
-            'waiting for',
-            '',
-            0,
-        ),
+        ({'robot': ''}, 'NO ROBOT', 'Start one', '', 0),
+        ({'silence': 12.0}, NO_CONTACT, 'for 12 s. STOP may', '', 0),
+        ({'statuses': [OLD]}, NO_CONTACT, 'unknown for 9 s', '', 0),
+        ({'statuses': [OLD, OTHER_FAULT]}, NO_CONTACT, 'emergency stop. j2 is faulty.', '', 0),
+        ({'statuses': [WAITS]}, NO_CONTACT, 'waiting for', '', 0),
+        ({'statuses': [FAULT], 'stop': STOOD}, 'FAULT', 'j1: 0x2310 over', 'Recover j1', 1),
+        ({'statuses': [FAULT]}, 'FAULT', '. Remove the cause, then recover.', 'Recover j1', 1),
+        ({'statuses': [FAULT, OTHER_FAULT]}, 'FAULT (2)', 'j1: ', 'Recover all 2', 2),
+        ({'statuses': [LOST]}, 'FAULT', 'offline', 'Recover j1', 1),
+        ({'statuses': [FAULT], 'acting': 'Recover j1'}, 'FAULT', 'Recover j1 ...', '', 0),
+        ({'statuses': [GOOD, BUS_OFF]}, 'FAULT', 'master: bus: bus off', '', 0),
+        ({'statuses': [legs(2, 'fault', 'fell')]}, 'FAULT', 'fell.', 'Clear fault', 1),
+        ({'stop': Stop()}, 'STOPPING', 'not confirmed yet', ALLOW, 0),
+        ({'stop': REFUSED}, 'STOP NOT CONFIRMED', 'use the emergency stop. no', ALLOW, 0),
+        ({'stop': STOOD}, 'STOPPED', 'Stopped: j1; the others stand. Nothing', ALLOW, 0),
+        ({'stop': STOOD, 'moving': True}, 'MOVING', 'moves it after STOP', ALLOW, 0),
+        ({'statuses': [BOOTS]}, 'NOT ENABLED', 'j1: offline, configuring.', '', 0),
+        ({'statuses': [OFF]}, 'NOT ENABLED', '1 of 1 drives', 'Enable j1', 2),
+        ({'statuses': [NO_MODE]}, 'NOT ENABLED', 'no mode', 'Select the mode', 1),
+        ({'limit': 'j2 is at its end'}, 'AT A LIMIT', 'J2 is at its end.', '', 0),
+        ({'moving': True}, 'MOVING', 'A program moves it.', '', 0),
+        ({}, 'READY', 'Hold a button to move.', '', 0),
+        ({'statuses': []}, 'READY', 'no drives', '', 0),
+        ({'statuses': [GOOD, CAMERA]}, 'READY', 'move. camera: frames reports an', '', 0),
+        ({'statuses': [legs(0, 'stand')]}, 'STANDING', 'Press Walk', '', 0),
+        ({'statuses': [legs(0, 'walk')]}, 'READY', 'Hold an arrow', '', 0),
+        ({'statuses': [legs(0, 'walk')], 'moving': True}, 'WALKING', 'A program', '', 0),
+        ({'statuses': [legs(1, 'lie', 'low')]}, 'LYING', 'low.', '', 0),
+        ({'statuses': [legs(0, 'to stand')]}, 'MOVING', 'Mode to stand.', '', 0),
     ],
 )
 def test_the_state_is_one_word_with_one_action(
-    seen: Seen, word: str, part: str, action: str, calls: int
+    changes: dict[str, Any], word: str, part: str, action: str, calls: int
 ) -> None:
-    """As the page, /diagnostics and the terminal show it."""
+    """As the page, /diagnostics and the terminal show it, of a robot with one good drive."""
+    seen = replace(ROBOT, **changes)
     state = robot_state(seen)
     assert (state.word, state.action) == (word, action)
     assert part in state.sentence
@@ -262,9 +217,8 @@ def test_motion_is_possible_only_where_nothing_speaks_against_it(
 
 def test_an_error_of_another_node_bars_no_motion() -> None:
     """It is shown, in amber; a fault is what keeps the robot itself from moving."""
-    camera = Status('camera: frames', 2, 'no frames')
     for robot in (ROBOT, replace(ROBOT, statuses=[legs(0, 'walk')])):
-        state = robot_state(replace(robot, statuses=[*robot.statuses, camera]))
+        state = robot_state(replace(robot, statuses=[*robot.statuses, CAMERA]))
         assert state.movable
         assert state.level is Level.WARNING
 

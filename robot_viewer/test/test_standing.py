@@ -190,7 +190,6 @@ class Dog(ViewerRig):
     """What the page takes for a quadruped."""
 
     def __init__(self) -> None:
-        """Publish its description, and take poses of the body."""
         node = Node('dog')
         super().__init__(node)
         self.poses: list[Pose] = []

@@ -68,7 +68,6 @@ class Robot(ViewerRig):
     """What the page meets: services of drives, a servo, and a viewer beside it."""
 
     def __init__(self) -> None:
-        """Offer them."""
         super().__init__(Node('robot'))
         self.calls: list[str] = []
         self.success = True

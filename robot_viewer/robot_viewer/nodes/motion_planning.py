@@ -72,7 +72,6 @@ class MotionPlanning:
         positions: Mapping[str, float],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        """Start without a move_group."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
         self._connected = self.offered = False
         self.hold = 0

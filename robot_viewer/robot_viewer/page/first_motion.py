@@ -109,7 +109,6 @@ class GuardedTargets:
     """Targets of one motion: at most one per heartbeat, and none without."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
-        """Start at rest."""
         self.guard = MotionGuard(plan, now)
         self._target = plan.start
         # a button counts as held until its heartbeats pause: heartbeats of an earlier press do not

@@ -112,7 +112,6 @@ class JogPanel:
         ways: tuple[Actions, Live, Share],
         place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
-        """Start with empty tabs."""
         self._actions, self._live, self._speed = ways
         self._gui, self._robot = gui, robot
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
@@ -425,7 +424,6 @@ class History:
     """The samples of all joints in the last :data:`KEPT` seconds."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._samples: dict[str, deque[tuple[float, float, float]]] = {}
 
     @property

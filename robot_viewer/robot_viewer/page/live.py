@@ -214,7 +214,6 @@ class Deadman:
     """
 
     def __init__(self) -> None:
-        """Start with no button held."""
         self.holder: Hashable = None
         self._last = -math.inf
         self._pressed: set[_Press] = set()  # not released yet

@@ -260,7 +260,7 @@ class RobotPage:
 
     def _camera(self, view: str) -> Velocity:
         reach = self.robot.size if self.robot is not None else 0.6
-        size = min(reach + 0.4, max(1.7 * reach, 0.3))
+        size = min(reach + 0.4, max(1.2 * reach, 0.3))
         x, y, z = VIEWS[view][1]
         return x * size, y * size, z * size
 

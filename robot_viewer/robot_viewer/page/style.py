@@ -143,7 +143,6 @@ class Log:
     """The latest log entries; repetitions are counted. Thread-safe."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._entries: deque[_Entry] = deque(maxlen=KEPT)
         self._html, self._changed = '', False
 
