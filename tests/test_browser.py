@@ -572,8 +572,8 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
                 continue
             stage = 'stopped' if stands.is_set() else 'braking' if answers else ''
             state = RobotState('READY', Level.WELL, '')
-            more: Overlay = {'stop': stage, 'simulated': True, 'program': '', 'listens': ''}
-            served.show_state(state, {}, more)
+            of = {'program': '', 'listens': '', 'namespace': ''}
+            served.show_state(state, {}, cast(Overlay, {'stop': stage, 'simulated': True, **of}))
 
     over, silent = threading.Event(), threading.Event()
     with (

@@ -115,6 +115,7 @@ class Shown:
                     'simulated': True,
                     'program': '',
                     'listens': '',
+                    'namespace': '',
                 },
             )
             self.page.list_log()

@@ -101,6 +101,8 @@ def see_it_back(url: str, restart: Callable[[], None]) -> None:
         return
     with chromium.browser() as browser:
         page = chromium.open_page(browser, url)
+        chromium.state_is(page, 'NOT ENABLED')
+        assert page.title() == 'left/panda: NOT ENABLED', 'tabs of several robots differ'
         page.keyboard.press('Space')
         chromium.state_is(page, 'STOPPED')
         restart()

@@ -234,6 +234,7 @@ class Judge:
                 'simulated': self._simulated,
                 'program': program,
                 'listens': f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
+                'namespace': self._node.get_namespace().strip('/'),
             }
             self._page.show_state(state, known, more)
 

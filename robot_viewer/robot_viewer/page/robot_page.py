@@ -16,13 +16,14 @@ from typing import Any, Protocol, TypedDict
 
 from urdf_reader import KinematicTree, Transform
 from viser import (
-    ClientHandle,
+    CameraHandle,
     GuiButtonHandle,
     GuiDropdownHandle,
     GuiHtmlHandle,
     GuiTabGroupHandle,
     GuiTabHandle,
     Icon,
+    InitialCameraConfig,
     ViserServer,
 )
 
@@ -130,6 +131,7 @@ class Overlay(TypedDict):
     simulated: bool
     program: str  # program that moves the robot; empty for none
     listens: str  # text on where the page searches for robots
+    namespace: str  # of the robot; empty for none
 
 
 class Panel(Protocol):
@@ -162,7 +164,7 @@ class RobotPage:
         for view, (key, _) in VIEWS.items():
             command = gui.add_command(f'View: {view}', hotkey=key, icon=Icon.CAMERA)  # type: ignore[arg-type]
             command.on_trigger(partial(self._look_from, view))
-        self.server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
+        self._set_camera('Fit', self.server.initial_camera)
         self._log = Log()
         self.last = ''  # the last message, with its time
         self._panels: dict[type, Panel] = {}
@@ -247,10 +249,9 @@ class RobotPage:
         second = 'Body' if feet_of(tree) else 'Plan'
         self._lay_out(('Drive', second, 'See', 'Diagnose'))
         self.robot = RobotScene(self.server.scene, tree)
-        self.server.initial_camera.position = self._camera('Fit')
-        self.server.initial_camera.look_at = (0.0, 0.0, 0.3 * self.robot.size)
+        self._set_camera('Fit', self.server.initial_camera)
         for client in self.server.get_clients().values():
-            self._place_camera(client, 'Fit')
+            self._set_camera('Fit', client.camera)
         if self.has('Plan'):
             ways = self._actions, self.live, self.speed
             place = partial(self.place, 'Drive')
@@ -258,21 +259,16 @@ class RobotPage:
         self.say(f'robot {tree.name}')
         return self.robot.notes
 
-    def _camera(self, view: str) -> Velocity:
-        reach = self.robot.size if self.robot is not None else 0.6
-        size = min(reach + 0.4, max(1.2 * reach, 0.3))
-        x, y, z = VIEWS[view][1]
-        return x * size, y * size, z * size
-
     def _look_from(self, view: str, event: Any) -> None:  # noqa: ANN401
         if event.client is not None:
-            self._place_camera(event.client, view)
+            self._set_camera(view, event.client.camera)
 
-    def _place_camera(self, client: ClientHandle, view: str) -> None:
-        height = 0.3 * self.robot.size if self.robot is not None else 0.3
-        x, y, z = self._camera(view)
-        client.camera.position = (x, y, z + height if view != 'Top' else z)
-        client.camera.look_at = (0.0, 0.0, height)
+    def _set_camera(self, view: str, camera: CameraHandle | InitialCameraConfig) -> None:
+        reach = self.robot.size if self.robot is not None else 0.6
+        size, height = min(reach + 0.4, max(1.2 * reach, 0.3)), 0.3 * reach
+        x, y, z = VIEWS[view][1]
+        camera.position = x * size, y * size, z * size + (height if view != 'Top' else 0.0)
+        camera.look_at = 0.0, 0.0, height
 
     def show_base(self, pose: Transform) -> None:
         """Show the pose of the root link in the world, with the grid moving below it."""
