@@ -13,17 +13,7 @@ import pytest
 from urdf_reader import link_poses
 
 from quad_builds import Build, urdf
-from quad_description import (
-    DescriptionError,
-    foot_position,
-    jacobian,
-    LEGS,
-    Pose,
-    pose_positions,
-    quadruped,
-    robot_urdf,
-    solve,
-)
+from quad_description import DescriptionError, foot_position, jacobian, LEGS, quadruped, solve
 from quad_description.kinematics import calf_rotation
 from quad_description.rotations import conjugate, multiply, rotation_vector
 
@@ -197,12 +187,3 @@ def test_links_may_be_named_as_others_do() -> None:
     robot = quadruped(theirs)
     assert robot.feet([0.1] * 12) == ours.feet([0.1] * 12)
     assert robot.foot_radius == ours.foot_radius
-
-
-def test_a_standing_robot_is_as_high_as_its_lowest_foot_says() -> None:
-    """The feet are balls: their centres are a radius above the ground."""
-    robot = quadruped(robot_urdf('mini'))
-    positions = list(pose_positions(Pose.STAND).values())
-    lowest = min(z for _, _, z in robot.feet(positions))
-    assert robot.foot_radius == pytest.approx(0.010)
-    assert robot.standing_height(positions) == pytest.approx(0.010 - lowest)
