@@ -55,7 +55,7 @@ def test_the_gait_beside_a_policy_is_the_one_of_its_two_stances_that_goes_better
 ) -> None:
     """With an arm on the vendor's soft servos it is the low and wide one."""
     path, report = write_policy(tmp_path / 'still.onnx', metadata()), tmp_path / 'report.csv'
-    soft = ['--arm', '--servo', 'vendor_rl', '--duration', '2']
+    soft = ['--arm', '--servo', 'vendor_rl', '--duration', '1']
     assert run([str(path), *soft, '--report', str(report)]) == 1
     rows = list(csv.DictReader(report.read_text(encoding='utf-8').splitlines()))
     ahead = [row for row in rows if (row['walker'], row['axis']) == ('gait', 'forward')]
@@ -78,18 +78,6 @@ def test_a_policy_that_bytes_do_not_suffice_for_is_found_over_v1(
     capsys.readouterr()
     assert run([*walk, '--v1']) == 1
     assert 'set noise' in capsys.readouterr().out
-
-
-def test_a_policy_that_only_stands_walks_nowhere(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The walk reports what happened, and not what was commanded; that is no success."""
-    path = write_policy(tmp_path / 'still.onnx', metadata())
-    assert run([str(path), '--walk', '0.2', '0', '0', '--duration', '2']) == 1
-    output = capsys.readouterr().out
-    went = output.partition(' went ')[2]
-    assert float(went.split()[0]) == pytest.approx(0.0, abs=0.02)
-    assert 'hardly any: look at the command' in output
 
 
 def damped(path: Path) -> Path:

@@ -366,13 +366,6 @@ def test_clips_are_read_as_their_tools_mean_them(tmp_path: Path) -> None:
     assert found == ['hip' in name for name in JOINTS], 'one that none matches is not clipped'
 
 
-def test_a_history_of_an_older_step_alone_is_refused(tmp_path: Path) -> None:
-    """It would be taken for the newest step."""
-    path = tmp_path / 'config.yaml'
-    path.write_text('xgo: {observations: [gravity_vec], observations_history: [1]}')
-    assert 'observations_history [1] has gaps' in read_contract_file(path).refusals[0]
-
-
 GOOD = {
     'joints': list(ROBOT.names),
     'default_positions': list(STAND),
@@ -462,6 +455,8 @@ observations: {policy: {a: {func: "b:c", history_length: x}}}}"""
             for words in (r'joint_mapping .* 0 to 1 are needed',)
         ),
         ('config.yaml', 'go2: {observations: 5}', 'config.yaml'),
+        # of an older step alone: it would be taken for the newest one
+        ('config.yaml', 'go2: {observations: [gravity_vec], observations_history: [1]}', 'gaps'),
         # Playground's Barkour, Go1 handstand, Spot
         *(
             ('config.json', f'{{ctrl_dt: 0.02, {more}}}', 'than the Go1 joystick')

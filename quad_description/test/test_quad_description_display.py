@@ -52,11 +52,7 @@ def display(isolation: Isolation, *parameters: str) -> subprocess.Popen[str]:
     arguments = [word for text in parameters for word in ('-p', text)]
     command = [sys.executable, '-m', 'quad_description.display', '--ros-args', *arguments]
     return subprocess.Popen(
-        command,
-        cwd=PACKAGE,
-        env=isolation.env,
-        stderr=subprocess.PIPE,
-        text=True,
+        command, cwd=PACKAGE, env=isolation.env, stderr=subprocess.PIPE, text=True
     )
 
 

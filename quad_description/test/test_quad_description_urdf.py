@@ -70,12 +70,6 @@ def inertia(link: ET.Element) -> Array:
     return np.array([[float(values.attrib[key]) for key in row] for row in rows])
 
 
-BROKEN = (
-    '<robot><link name="b"/><link name="c"/>'
-    '<joint name="a" type="revolute"><parent link="b"/><child link="c"/>{}</joint></robot>'
-)
-
-
 @builds
 def test_links_and_motors_are_those_that_others_name(preset: str, arm: bool) -> None:
     """One tree with base_link as root; motors leg by leg, then those of the arm and its gripper.
@@ -200,21 +194,6 @@ def test_a_trunk_or_preset_that_cannot_be_is_refused(kilograms: float) -> None:
         robot_urdf('mini', trunk_mass=kilograms)
     with pytest.raises(PresetError, match="'rider'; choose one of lite, mini"):
         robot_urdf('rider')
-
-
-@pytest.mark.parametrize(
-    ('urdf', 'message'),
-    [
-        ('<robot', 'no XML'),
-        (BROKEN.format(''), 'joint a: a revolute joint needs <limit .../> with velocity and eff'),
-        (BROKEN.format('<limit velocity="1" effort="1" lower="x"/>'), 'a: <limit> is not usable'),
-        (BROKEN.format('<axis xyz="0 0 0"/>'), 'joint a: <axis> has no direction'),
-    ],
-)
-def test_a_broken_description_is_refused(urdf: str, message: str) -> None:
-    """The message names the joint."""
-    with pytest.raises(DescriptionError, match=message):
-        movable_joints(urdf)
 
 
 def test_the_xacro_file_takes_the_same_arguments() -> None:

@@ -98,10 +98,7 @@ def test_poses_below_the_body_are_recovered(
 
 
 @robots
-@given(
-    index=legs,
-    foot=st.tuples(*[st.floats(-0.4, 0.4)] * 3),
-)
+@given(index=legs, foot=st.tuples(*[st.floats(-0.4, 0.4)] * 3))
 def test_any_target_gives_angles_within_limits(
     name: str, index: int, foot: tuple[float, float, float]
 ) -> None:

@@ -337,14 +337,3 @@ def test_what_goes_wrong_in_a_process_is_said(deadly: bool, said: str) -> None:
     finally:
         envs.close()
     assert not multiprocessing.active_children()
-
-
-def test_a_share_of_the_ranges_lies_between_nothing_and_all() -> None:
-    """Noise stays."""
-    ranges = Randomization()
-    none, half = ranges.scaled(0.0), ranges.scaled(0.5)
-    assert none.friction == NO_RANDOMIZATION.friction
-    assert none.kick == (0.0, 0.0)
-    assert none.noise == ranges.noise
-    assert ranges.scaled(1.0) == ranges
-    assert half.friction == pytest.approx((0.6, 1.05))

@@ -223,18 +223,6 @@ def test_a_robot_without_torque_sinks_and_is_caught_where_it_is() -> None:
     assert robot.base_pose.position[2] == pytest.approx(height, abs=5e-3)
 
 
-def test_servos_differ_in_how_they_sag() -> None:
-    """The vendor's training actuator is soft, the firm one is not; custom numbers are taken."""
-
-    def sag(servo: ServoModel | ServoParameters) -> float:
-        robot = settled(Robot(URDF, servo))
-        return float(np.abs(robot.joint_positions - robot.joint_targets).max())
-
-    assert sag(ServoModel.FIRM) < 0.01
-    assert sag(ServoModel.VENDOR_RL) > 0.05
-    assert sag(ServoParameters(stiffness=40.0, velocity_gain=0.4)) < sag(ServoModel.FIRM)
-
-
 def test_servos_are_as_strong_and_fast_as_the_urdf_and_the_motor_line_allow() -> None:
     """No torque above the stall torque, and a free leg stays below the no-load speed."""
     lifted = Robot(URDF, ServoParameters(stiffness=100.0))

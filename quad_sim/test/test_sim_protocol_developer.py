@@ -4,15 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 import itertools
 import math
-import os
 from pathlib import Path
-import pty
 import struct
 import time
-import tty
 
 import pytest
 from sim_serial import serve, Served, VirtualRobot
@@ -30,10 +27,20 @@ from quad_hardware.backend import recorded_in, SerialBackend
 from quad_hardware.doctor.main import check_port
 from quad_hardware.estimation import Estimator, EstimatorSettings
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.link import Driver, LinkOptions, LinkState
+from quad_hardware.link import LinkOptions
 from quad_hardware.link.dialects import DeveloperDialect
 from quad_hardware.link.open import open_session
-from quad_hardware.protocol import DEVELOPER, Frame, Kind, LEG_MOTORS, PROTOCOLS, Register, V1
+from quad_hardware.protocol import (
+    DEVELOPER,
+    Frame,
+    Kind,
+    LEG_MOTORS,
+    PROTOCOLS,
+    Register,
+    ROBOT_KINDS,
+    StreamParser,
+    V1,
+)
 from quad_hardware.report import Report
 from quad_hardware.serial_robot import RobotSettings
 from quad_sim.board import Walker
@@ -75,9 +82,12 @@ def wait(condition: Callable[[], bool], what: str) -> None:
         time.sleep(0.002)
 
 
-def test_the_board_sends_what_the_page_says_and_answers_nothing() -> None:
+@pytest.mark.parametrize('order', ['<', '>'])
+def test_the_board_sends_what_the_page_says_and_answers_nothing(order: str) -> None:
     """33 bytes at 50 Hz, from which struct reads attitude, servos and charge; no reply."""
-    robot = VirtualRobot(*ARGUMENTS, '--battery', '80', protocol=DEVELOPER)
+    endian = ('--big-endian',) if order == '>' else ()
+    slope = '--slope', '8', '--start', 'stand'
+    robot = VirtualRobot(*ARGUMENTS, *endian, *slope, '--battery', '80', protocol=DEVELOPER)
     robot.line.receive(Frame(Kind.READ, Register.FIRMWARE, b'\x0a').encode(V1), 0.0)
     robot.run(1.0)
     frames = [robot.received[at : at + 33] for at in range(0, len(robot.received), 33)]
@@ -85,7 +95,8 @@ def test_the_board_sends_what_the_page_says_and_answers_nothing() -> None:
     for frame in frames[1:-1]:
         assert (frame[:5], frame[-2:]) == (b'\x55\x00\x21\x00\x00', b'\x00\xaa')
         assert (sum(frame[2:-2]) % 256, frame[29]) == (255, 80)
-        assert struct.unpack('<3f', frame[5:17]) == pytest.approx((0.0, 0.0, 0.0), abs=1.0)
+    attitude = struct.unpack(f'{order}3f', frames[-2][5:17])
+    assert attitude == pytest.approx((0.0, -8.0, 0.0), abs=2.0)
     assert robot.simulation.line.statistics.frames == 0
 
 
@@ -121,91 +132,37 @@ def test_joint_velocities_are_of_what_was_measured_anew() -> None:
     assert found[20:55] == pytest.approx([speed] * 35, rel=0.35)
 
 
-@pytest.fixture
-def port(tmp_path: Path) -> Iterator[tuple[int, Path]]:
-    """A pseudo-terminal: the robot's end, and the path of the other."""
-    robot, host = pty.openpty()
-    tty.setraw(host)
-    os.set_blocking(robot, False)
-    yield robot, Path(os.ttyname(host))
-    os.close(robot)
-    os.close(host)
-
-
 @pytest.mark.parametrize('order', ['<', '>'])
-def test_it_is_listened_to_and_a_damaged_frame_is_refused(
-    port: tuple[int, Path], order: str
-) -> None:
-    """No byte goes out before a command; either order of the floats; a loss is reported."""
-    robot, path = port
-    states: list[Report] = []
-
-    def take(report: Report) -> str:
-        states.append(report)
-        return ''
-
-    changes: list[LinkState] = []
-    driver = Driver(
-        LinkOptions(str(path), (DEVELOPER,)), take, lambda state, _: changes.append(state)
-    )
-
-    def push(frame: bytes, until: Callable[[], bool]) -> None:
-        def is_there() -> bool:
-            os.write(robot, frame)
-            time.sleep(PERIOD)
-            return until()
-
-        wait(is_there, f'effect of {frame.hex(" ")}')
-
+def test_it_is_listened_to_and_a_damaged_frame_is_refused(order: str) -> None:
+    """No byte goes out before a command; either order of the floats; commands are those of v1."""
+    dialect, parser = DeveloperDialect(0.0), StreamParser(DEVELOPER, ROBOT_KINDS)
     good = pushed(order, (1.5, -2.25, 179.9), 128)
     damaged = bytearray(good)
     damaged[20] ^= 0x10
-    driver.start()
-    try:
-        push(good, lambda: driver.status().state is LinkState.RUNNING and len(states) > 10)
-        count = len(states)
-        os.write(robot, damaged)
-        push(good, lambda: len(states) > count + 5)
-        with pytest.raises(BlockingIOError):
-            os.read(robot, 1)
-        status = driver.status()
-        assert (status.protocol, status.baud, status.parser.bad_checksum) == (
-            'developer',
-            1_000_000,
-            1,
-        )
-        last = states[-1]
-        assert last.attitude == pytest.approx((1.5, -2.25, 179.9), abs=1e-4)
-        assert {report.positions[11] for report in states} == {last.positions[11]}
-        assert last.positions.keys() == set(LEG_MOTORS)
-        assert (last.battery, last.acceleration, last.rates) == (77, None, None)
-        assert driver.command(dict.fromkeys(LEG_MOTORS, 0.0))
-        sent = bytearray()
-
-        def is_sent() -> bool:
-            os.write(robot, good)
-            time.sleep(PERIOD)
-            try:
-                sent.extend(os.read(robot, 64))
-            except BlockingIOError:
-                return False
-            return len(sent) >= 20
-
-        wait(is_sent, 'command')
-        assert (bytes(sent[:5]), len(sent)) == (b'\x55\x00\x14\x00\x50', 20)
-        wait(lambda: LinkState.STALE in changes, 'loss')
-    finally:
-        driver.stop()
+    reports: list[Report] = []
+    for count in range(20):
+        now = count * PERIOD
+        assert not dialect.step(now).send
+        for frame in parser.feed(bytes(damaged) if count == 10 else good):
+            report = dialect.handle_frame(frame, now)
+            assert report is not None
+            reports.append(report)
+    assert (len(reports), parser.counters.bad_checksum) == (19, 1)
+    last = reports[-1]
+    assert last.attitude == pytest.approx((1.5, -2.25, 179.9), abs=1e-4)
+    assert {report.positions[11] for report in reports} == {last.positions[11]}
+    assert last.positions.keys() == set(LEG_MOTORS)
+    assert (last.battery, last.acceleration, last.rates) == (77, None, None)
+    dialect.command(dict.fromkeys(LEG_MOTORS, 0.0))
+    sent = dialect.step(now + PERIOD).send
+    assert (sent[:5], len(sent)) == (b'\x55\x00\x14\x00\x50', 20)
 
 
-@pytest.mark.parametrize('order', [(), ('--big-endian',)], ids=['little', 'big'])
-def test_auto_finds_a_robot_that_stands_up_walks_and_is_lost(
-    tmp_path: Path, order: tuple[str, ...]
-) -> None:
+def test_auto_finds_a_robot_that_stands_up_walks_and_is_lost(tmp_path: Path) -> None:
     """By commands, in physics; its log replays; a line that falls silent is reported."""
     log = tmp_path / 'serial.log'
     with (
-        serve(tmp_path / 'xgo', *ARGUMENTS, *order) as served,
+        serve(tmp_path / 'xgo', *ARGUMENTS) as served,
         SerialBackend(settings(served, log=log)) as backend,
     ):
         place = dict(zip(backend.names, joints(backend.reset()).positions, strict=True))

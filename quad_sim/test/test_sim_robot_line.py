@@ -29,10 +29,7 @@ pytestmark = pytest.mark.slow
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 LIMITS = movable_joints(robot_urdf('lite'))
-QUESTION = {
-    V1: Frame(Kind.READ, Register.BATTERY, b'\x01'),
-    V2: Frame(Kind.READ, Code.BATTERY),
-}
+QUESTION = {V1: Frame(Kind.READ, Register.BATTERY, b'\x01'), V2: Frame(Kind.READ, Code.BATTERY)}
 both = pytest.mark.parametrize('protocol', [V1, V2], ids=['v1', 'v2'])
 
 

@@ -103,7 +103,10 @@ def of_dynamics(model: mujoco.MjModel) -> dict[str, np.ndarray]:
 
 
 def test_mjcf_is_the_same_robot(tmp_path: Path) -> None:
-    """Masses, joints, servos and sensors; on the floor it moves as ours does from its keyframe."""
+    """Masses, joints, servos and sensors; on the floor it moves as ours does from its keyframe.
+
+    Newton reads position servos alone as servos; MuJoCo Warp refuses the flag `autoreset`.
+    """
     path = tmp_path / 'xgo.xml'
     servo = 'kp=6,kv=0.2,damping=0.05,interpolation=0'
     assert run([str(path), '--servo', servo, '--floor']) == 0
@@ -124,37 +127,31 @@ def test_mjcf_is_the_same_robot(tmp_path: Path) -> None:
         robot.step(0.02)
         mujoco.mj_step(model, data, 10)
     assert data.qpos[:3] == pytest.approx(robot.base_pose.position, abs=2e-3)
-
-
-def test_mjcf_without_a_floor_is_the_robot_alone(tmp_path: Path) -> None:
-    """For a scene of the trainer; its feet have names to give them friction by."""
-    path = tmp_path / 'xgo.xml'
-    assert run([str(path), '--servo', 'vendor_rl']) == 0
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, 'floor') == -1
-    assert {model.geom(foot).name for foot in Robot(robot_urdf()).feet}
-    names = [model.actuator(index).name for index in range(model.nu)]
-    assert tuple(names) == Robot(robot_urdf()).joint_names
-
-
-def test_trainers_recognize_servos_and_take_the_options(tmp_path: Path) -> None:
-    """Newton reads position servos alone as servos; MuJoCo Warp refuses the flag `autoreset`."""
-    path = tmp_path / 'xgo.xml'
-    assert run([str(path), '--servo', 'kp=6,kv=0.2,damping=0.05,interpolation=0']) == 0
     root = ET.parse(path)  # noqa: S314  # written by us
     servos = list(root.iter('position'))
     assert [(each.get('kp'), each.get('kv')) for each in servos] == [('6', '0.2')] * 12
     assert all(each.get('forcerange') and each.get('ctrlrange') for each in servos)
     assert not list(root.iter('general'))
-    model = mujoco.MjModel.from_xml_path(str(path))
     assert not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
 
-def test_the_urdf_for_other_tools_is_read_by_mujoco(capsys: pytest.CaptureFixture[str]) -> None:
-    """As it is printed: base_footprint would be a body without mass on a joint of its own."""
+def test_other_tools_read_the_robot_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As MJCF without a floor for a scene of the trainer, with feet to give friction to by name.
+
+    And as URDF: base_footprint would be a body without mass on a joint of its own.
+    """
+    path = tmp_path / 'xgo.xml'
+    assert run([str(path), '--servo', 'vendor_rl']) == 0
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, 'floor') == -1
+    robot = Robot(robot_urdf())
+    assert all(model.geom(foot).name == foot for foot in robot.feet)
+    assert tuple(model.actuator(index).name for index in range(model.nu)) == robot.joint_names
+    capsys.readouterr()
     assert print_urdf(['--preset', 'lite']) == 0
-    model = mujoco.MjModel.from_xml_string(capsys.readouterr().out)
-    assert model.nq == 12
+    assert mujoco.MjModel.from_xml_string(capsys.readouterr().out).nq == 12
     assert print_urdf(['--base-footprint']) == 0
     assert 'base_footprint' in capsys.readouterr().out
 
