@@ -126,6 +126,10 @@ def controller() -> Node:
     [
         (controller, 'swing_hight:=0.03', "did you mean 'swing_height'"),
         (controller, 'arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
+        (controller, 'gait:=gallop', "gait is 'gallop': it must be trot, crawl or pace"),
+        (controller, 'nominal_height:=0.5', 'do not reach'),
+        (controller, 'loop_rate:=fast', "loop_rate is 'fast': it must be a number"),
+        (controller, 'loop_rate:=10.0', 'it must be 25.0 to 200.0'),
         (HardwareNode, 'protokoll:=old', "did you mean 'protocol'"),
         (controller, 'robot_description:=none', 'robot_description: .*no XML'),
         (HardwareNode, 'robot_description:=none', 'robot_description: .*no XML'),

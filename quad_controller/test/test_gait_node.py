@@ -9,9 +9,7 @@ from contextlib import contextmanager
 from functools import partial
 import math
 from pathlib import Path
-import re
 import sys
-import threading
 from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -20,17 +18,14 @@ from processes import RunningProcess
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
-import rclpy
 from rclpy.duration import Duration
 from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
 
-from node_runner import LATCHED, ParameterError
-from quad_controller import QuadControllerError
-from quad_controller.nodes.controller_node import ControllerNode
+from node_runner import LATCHED
 from quad_controller.recording import run as replay_policy
-from quad_description import DescriptionError, quadruped, robot_urdf
+from quad_description import quadruped, robot_urdf
 from quad_gait_rig import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
@@ -317,24 +312,3 @@ def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot)
         lambda: robot.client.trigger('controller_node/clear_fault').success, 20.0, 'clearing'
     )
     robot.until_state('relax')
-
-
-@pytest.mark.parametrize(
-    ('parameter', 'reason'),
-    [
-        ('gait:=gallop', "gait is 'gallop': it must be trot, crawl or pace"),
-        ('nominal_height:=0.5', 'do not reach'),
-        ('loop_rate:=fast', "loop_rate is 'fast': it must be a number"),
-        ('loop_rate:=10.0', 'it must be 25.0 to 200.0'),
-    ],
-)
-def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) -> None:
-    """A parameter that makes no sense is reported, and nothing runs."""
-    rclpy.init(args=['--ros-args', '-p', parameter])
-    try:
-        with pytest.raises(
-            (ParameterError, QuadControllerError, DescriptionError), match=re.escape(reason)
-        ):
-            ControllerNode(threading.Event())
-    finally:
-        rclpy.shutdown()

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import islice
 import math
 import operator
@@ -30,14 +29,8 @@ from quad_controller import (
 )
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import OdometryState, quadruped, robot_urdf, RobotState, Targets
-from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_rig import FIRM, firm, MODEL, PERIOD, PhysicsRig
-from quad_hardware.estimation import (
-    ImuMounting,
-    LegOdometry,
-    OdometrySettings,
-    UNCHECKED_DEVIATION,
-)
+from quad_hardware.estimation import LegOdometry, OdometrySettings
 from quad_sim import ServoModel as ServoModels
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
@@ -313,36 +306,7 @@ def test_odometry_follows_gait_and_policy(
     went = end.position[0] - start.position[0], end.position[1] - start.position[1]
     assert math.hypot(*went) > 0.3
     assert math.dist(found, went) < within * math.hypot(*went)
-    assert right > rightly
-
-
-def yawed_imu(mounting: ImuMounting, state: RobotState) -> RobotState:
-    """What a controller gets of an IMU that is turned by 180 degrees about the vertical."""
-    assert state.imu is not None
-    turned = multiply(state.imu.orientation, about_z(math.pi))
-    roll, pitch, yaw = map(math.degrees, roll_pitch_yaw(turned))
-    orientation = mounting.attitude((roll, pitch, yaw))
-    deviation = 0.02 if mounting.checked else UNCHECKED_DEVIATION
-    return replace(state, imu=replace(state.imu, orientation=orientation, deviation=deviation))
-
-
-@pytest.mark.parametrize(
-    ('mounting', 'least', 'most'),
-    [
-        (ImuMounting(about_z(math.pi), checked=True), 4.0, 6.5),  # levelled
-        (ImuMounting(), 7.5, 8.5),  # as the slope is
-    ],
-    ids=['mounting is known', 'nobody has checked it'],
-)
-def test_an_imu_that_sits_otherwise_tilts_nobody(
-    mounting: ImuMounting, least: float, most: float
-) -> None:
-    """On a slope of 8 degrees; taken for an IMU that sits right, it tilts the body by 16."""
-    slope = firm(Terrain.slope(math.radians(8.0)))
-    rig = PhysicsRig(slope, FIRM, sense=partial(yawed_imu, mounting))
-    rig.run(3.0)
-    assert rig.state == 'stand'
-    assert least < math.degrees(rig.robot.base_pose.tilt) < most
+    assert right > rightly, right
 
 
 def test_a_recorded_walk_is_commanded_alike() -> None:

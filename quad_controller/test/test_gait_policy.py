@@ -8,8 +8,6 @@ from dataclasses import replace
 import math
 from pathlib import Path
 
-from hypothesis import given
-from hypothesis import strategies as st
 import numpy as np
 import numpy.typing as npt
 from policy_export import export, Layers
@@ -165,28 +163,6 @@ def test_the_frame_of_the_imu_is_not_guessed() -> None:
 def test_other_spellings_are_understood(changes: dict[str, str]) -> None:
     """Prefixes, lists for numbers, mjlab's names and neutral extras are no difference."""
     assert not check(FakeNetwork(metadata(**changes))).report.refused
-
-
-@given(st.permutations(range(12)), st.integers(0, 11))
-def test_joints_are_permuted_by_name(order: list[int], moved: int) -> None:
-    """Whatever the file's order, an action moves the joint of its name, and sees it too."""
-    names = joined([JOINTS[index] for index in order])
-    defaults = joined([round(STAND[index], 3) for index in order])
-    network = FakeNetwork(metadata(joint_names=names, default_joint_pos=defaults))
-    runner = check(network).runner
-    network.action[0, order.index(moved)] = 0.4
-    positions = tuple(
-        angle + (0.05 if index == moved else 0.0) for index, angle in enumerate(STAND)
-    )
-    velocities = tuple(1.0 if index == moved else 0.0 for index in range(12))
-    targets = runner.step(Situation(JointSample(positions, velocities), UPRIGHT), PERIOD).targets
-    assert targets is not None
-    for index, target in enumerate(targets):
-        assert target == pytest.approx(STAND[index] + (0.1 if index == moved else 0.0), abs=1e-3)
-    place = order.index(moved)
-    observed = network.asked[-1][0]
-    assert observed[11 + place] == pytest.approx(0.05, abs=1e-3)
-    assert observed[23 + place] == 1.0
 
 
 @pytest.mark.parametrize(

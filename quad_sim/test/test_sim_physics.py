@@ -185,6 +185,14 @@ def test_set_points_go_straight_to_the_target() -> None:
     assert robot.joint_targets[[1, 4]] == pytest.approx([1.0, 1.1])
 
 
+def test_targets_are_kept_within_the_limits() -> None:
+    """What lies beyond a limit of the URDF is taken to it."""
+    robot = Robot(URDF)
+    robot.set_targets([10.0] * 12)
+    robot.step(0.5)
+    assert robot.joint_targets == pytest.approx([j.limits.upper for j in movable_joints(URDF)])
+
+
 @pytest.mark.parametrize(
     ('targets', 'message'),
     [

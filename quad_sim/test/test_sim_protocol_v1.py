@@ -218,6 +218,7 @@ def test_both_middles_are_rest(byte: int) -> None:
     robot.run(1.0)
     write(robot, Register.VX, byte)
     robot.run(1.0)
+    assert robot.simulation.board.walker.command == (0.0, 0.0, 0.0), 'it does not creep'
     assert max(map(abs, travel(robot, 0.5))) < 0.01
     assert robot.simulation.plant.base_pose.position[2] > 0.09
 
