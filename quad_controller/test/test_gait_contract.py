@@ -65,11 +65,17 @@ def load(path: Path) -> LoadedPolicy:
     return load_policy(path, ROBOT, STAND, OPTIONS, PERIOD)
 
 
-def controlled(tool: Tool, folder: Path, *settings: str) -> Controller:
-    """Return a controller with a tool's policy, whose contract is attached."""
-    write_network(tool, folder / 'policy.onnx')
+def made(tool: Tool, folder: Path, *settings: str, external: bool = False) -> Path:
+    """Write a tool's policy, whose contract is attached; return its path."""
+    path = folder / 'policy.onnx'
+    write_network(tool, path, external=external)
     assert run([*attached(tool, folder), *settings]) == 0
-    policy = load(folder / 'policy.onnx').runner
+    return path
+
+
+def controlled(tool: Tool, folder: Path, *settings: str) -> Controller:
+    """Return a controller with such a policy."""
+    policy = load(made(tool, folder, *settings)).runner
     return Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
 
 
@@ -137,10 +143,7 @@ def test_what_a_file_leaves_open_is_asked_for(
 def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
     """Weights beside the file count; a name that leads elsewhere is refused."""
     tool = TOOLS['rl_sar']()
-    path = tmp_path / 'policy.onnx'
-    write_network(tool, path, external=True)
-    read = attached(tool, tmp_path)
-    assert run(read) == 0
+    path, read = made(tool, tmp_path, external=True), attached(tool, tmp_path)
     first = load(path)
     assert 'sha256 is of both' in str(first)
     side = tmp_path / 'policy.onnx.data'
@@ -162,10 +165,7 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
 
 def test_a_policy_may_be_a_link(tmp_path: Path) -> None:
     """Its weights lie beside the link, as in the cache of a download, or beside the file."""
-    tool = TOOLS['rl_sar']()
-    path = tmp_path / 'policy.onnx'
-    write_network(tool, path, external=True)
-    assert run(attached(tool, tmp_path)) == 0
+    path = made(TOOLS['rl_sar'](), tmp_path, external=True)
     digest = load(path).digest
     linked, snapshot = (tmp_path / folder / 'policy.onnx' for folder in ('linked', 'snapshot'))
     for link in (linked, snapshot):
@@ -180,9 +180,7 @@ def test_a_policy_may_be_a_link(tmp_path: Path) -> None:
 def test_weights_that_are_overwritten_do_not_count(tmp_path: Path) -> None:
     """A new export is copied over the old one while the robot walks."""
     tool = TOOLS['playground']()
-    path, side = tmp_path / 'policy.onnx', tmp_path / 'policy.onnx.data'
-    write_network(tool, path, external=True)
-    assert run(attached(tool, tmp_path)) == 0
+    path, side = made(tool, tmp_path, external=True), tmp_path / 'policy.onnx.data'
     network = OnnxNetwork(path)
     network.recur((RecurrentState('h_in', 'h_out'),))
     seen = np.ones((1, tool.width), np.float32)
@@ -493,10 +491,7 @@ def test_a_contract_beside_the_policy_counts(tmp_path: Path) -> None:
 
 def test_commands_stay_within_the_training(tmp_path: Path) -> None:
     """What is faster than the policy was trained for is clamped, as its table says."""
-    tool = TOOLS['playground']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run([*attached(tool, tmp_path), '--set', 'commands={x: [-0.1, 0.2]}']) == 0
-    loaded = load(tmp_path / 'policy.onnx')
+    loaded = load(made(TOOLS['playground'](), tmp_path, '--set', 'commands={x: [-0.1, 0.2]}'))
     assert 'clamped to x -0.1 to 0.2' in str(loaded.report)
     situation, _ = recorded(np.random.default_rng(3))
     observed = loaded.runner.observe(replace(situation, velocity=Velocity(0.5, 0.4, -0.3)))[0]
@@ -642,11 +637,9 @@ def test_what_leads_the_legs_elsewhere_is_refused(
     name: str, setting: str, reason: str, tmp_path: Path
 ) -> None:
     """Complete as the contract is: offsets, recurrent states of other sizes, clips off limits."""
-    tool = TOOLS[name]()
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run([*attached(tool, tmp_path), '--set', setting]) == 0
+    path = made(TOOLS[name](), tmp_path, '--set', setting)
     with pytest.raises(PolicyError, match=reason):
-        load(tmp_path / 'policy.onnx')
+        load(path)
 
 
 def test_a_whole_list_of_terms_has_its_own_order() -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 import math
@@ -17,7 +18,7 @@ import pytest
 from sim_envs import Broken, varied
 
 from quad_description import robot_urdf
-from quad_sim import SetupError, SimulationError, TargetError, Terrain
+from quad_sim import ServoParameters, SetupError, SimulationError, TargetError, Terrain
 from quad_sim.env import (
     CommandRanges,
     ID,
@@ -32,6 +33,7 @@ from quad_sim.physics import PhysicsBackend, Robot, Variation
 
 REST = CommandRanges(rest=1.0)
 STAND = np.zeros(12, np.float32)
+URDF = robot_urdf('mini')
 COMMAND = (0.2, 0.0, 0.5)
 
 
@@ -254,6 +256,22 @@ def test_an_action_that_is_not_finite_or_complete_is_refused(action: np.ndarray)
         (lambda: WalkingEnv().reset(options={'command': (0.1, 0.2)}), 'x and y'),
         (lambda: WalkingEnv().reset(options={'command': (0.1, math.nan, 0.0)}), 'x and y'),
         (lambda: WalkingEnv().reset(options={'comand': (0.1, 0.0, 0.0)}), 'comand'),
+        (lambda: ServoParameters(stiffness=-1), 'stiffness -1'),
+        (lambda: ServoParameters(stiffness=0), 'never moves'),
+        (lambda: ServoParameters(stiffness=1, damping=math.nan), 'damping nan'),
+        (lambda: ServoParameters(stiffness=1, delay=1.5), 'give 0 to 1'),
+        (lambda: Terrain.slope(1.0), 'slope of 1.0'),
+        (lambda: Terrain.slope(math.nan), 'slope of nan'),
+        (lambda: Terrain(friction=0), 'friction 0'),
+        (lambda: Robot(URDF, timestep=0.5), 'timestep 0.5'),
+        (lambda: Robot(URDF, pose={'tail_joint': 0}), 'tail_joint'),
+        (lambda: Robot(URDF).set_torque(False, ['tail']), 'tail'),
+        (lambda: Robot(URDF).kick((math.nan, 0, 0)), 'kick'),
+        (lambda: Robot(URDF).kick((0, 0, 11)), 'up to 10 m/s'),
+        (lambda: Robot(URDF).push((0, 0, 0), -1), 'push'),
+        (lambda: Robot(URDF).push((1e3, 0, 0), 1), 'up to 200 N'),
+        (lambda: Robot(URDF).push((0, math.inf, 0), 1), 'push'),
+        (lambda: Robot(URDF).push((1, 0, 0), math.nan), 'push'),
         (lambda: Variation(friction=0.0), 'friction'),
         (lambda: Variation(stiffness=math.nan), 'stiffness'),
         (lambda: Variation(damping=-0.1), 'damping'),
@@ -262,7 +280,7 @@ def test_an_action_that_is_not_finite_or_complete_is_refused(action: np.ndarray)
     ],
 )
 def test_what_makes_no_sense_is_refused(make: Callable[[], object], reason: str) -> None:
-    """Before anything moves, with what it should be."""
+    """Before anything moves, with the option and its value or what it should be."""
     with pytest.raises(SetupError, match=reason):
         make()
 
@@ -270,8 +288,7 @@ def test_what_makes_no_sense_is_refused(make: Callable[[], object], reason: str)
 def test_many_in_processes_are_the_same_ones() -> None:
     """Each row is what that environment alone would give, over the ends of episodes, too."""
     count = 5
-    envs = ProcessVectorEnv(partial(varied, 1.0), count, processes=2)
-    try:
+    with closing(ProcessVectorEnv(partial(varied, 1.0), count, processes=2)) as envs:
         alone = [varied(1.0) for _ in range(count)]
         seen, _ = envs.reset(seed=7)
         for index, env in enumerate(alone):
@@ -289,8 +306,6 @@ def test_many_in_processes_are_the_same_ones() -> None:
                     assert found == pytest.approx(info['reward_terms']['tracking'])
                     one, _ = env.reset()
                 assert (seen[index] == one).all()
-    finally:
-        envs.close()
 
 
 def test_gymnasium_makes_many_in_processes() -> None:
@@ -310,8 +325,7 @@ def test_gymnasium_makes_many_in_processes() -> None:
 
 def test_ranges_of_many_are_changed_on_the_way() -> None:
     """From the next episodes on."""
-    envs = ProcessVectorEnv(partial(varied, 0.0), 4, processes=2)
-    try:
+    with closing(ProcessVectorEnv(partial(varied, 0.0), 4, processes=2)) as envs:
         first, _ = envs.reset(seed=3)
         envs.call('vary', Randomization(level_bias=(0.2, 0.2)))
         second, _ = envs.reset(seed=3)
@@ -319,21 +333,16 @@ def test_ranges_of_many_are_changed_on_the_way() -> None:
         assert np.abs(second[:, 3:5]).min() > 0.15
         with pytest.raises(SimulationError, match='nothing'):
             envs.call('nothing')
-    finally:
-        envs.close()
 
 
 @pytest.mark.parametrize(('deadly', 'said'), [(False, 'the third step'), (True, 'exit code 7')])
 def test_what_goes_wrong_in_a_process_is_said(deadly: bool, said: str) -> None:
     """And the others end."""
-    envs = ProcessVectorEnv(partial(Broken, deadly), 2, processes=2)
-    try:
+    with closing(ProcessVectorEnv(partial(Broken, deadly), 2, processes=2)) as envs:
         envs.reset(seed=1)
         actions = np.zeros((2, 12), np.float32)
         envs.step(actions)
         envs.step(actions)
         with pytest.raises(SimulationError, match=said):
             envs.step(actions)
-    finally:
-        envs.close()
     assert not multiprocessing.active_children()

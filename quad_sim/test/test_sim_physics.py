@@ -304,33 +304,6 @@ def test_a_description_that_is_no_quadruped_is_refused(urdf: str, message: str) 
         Robot(urdf)
 
 
-@pytest.mark.parametrize(
-    ('make', 'message'),
-    [
-        (lambda: ServoParameters(stiffness=-1), 'stiffness -1'),
-        (lambda: ServoParameters(stiffness=0), 'never moves'),
-        (lambda: ServoParameters(stiffness=1, damping=math.nan), 'damping nan'),
-        (lambda: ServoParameters(stiffness=1, delay=1.5), 'give 0 to 1'),
-        (lambda: Terrain.slope(1.0), 'slope of 1.0'),
-        (lambda: Terrain.slope(math.nan), 'slope of nan'),
-        (lambda: Terrain(friction=0), 'friction 0'),
-        (lambda: Robot(URDF, timestep=0.5), 'timestep 0.5'),
-        (lambda: Robot(URDF, pose={'tail_joint': 0}), 'tail_joint'),
-        (lambda: Robot(URDF).set_torque(False, ['tail']), 'tail'),
-        (lambda: Robot(URDF).kick((math.nan, 0, 0)), 'kick'),
-        (lambda: Robot(URDF).kick((0, 0, 11)), 'up to 10 m/s'),
-        (lambda: Robot(URDF).push((0, 0, 0), -1), 'push'),
-        (lambda: Robot(URDF).push((1e3, 0, 0), 1), 'up to 200 N'),
-        (lambda: Robot(URDF).push((0, math.inf, 0), 1), 'push'),
-        (lambda: Robot(URDF).push((1, 0, 0), math.nan), 'push'),
-    ],
-)
-def test_options_without_sense_are_refused(make: object, message: str) -> None:
-    """The message names the option and its value."""
-    with pytest.raises(SetupError, match=message):
-        make()  # type: ignore[operator]
-
-
 @pytest.mark.parametrize(('step', 'torque'), [(0.028, 0.0), (-0.028, 0.0), (0.1, 0.14)])
 def test_a_servo_does_not_pull_within_its_free_width(step: float, torque: float) -> None:
     """Dead band and half the backlash to either side; beyond it, by the rest of the error."""
