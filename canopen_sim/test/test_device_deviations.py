@@ -144,6 +144,14 @@ def test_slow_sdo_answers_late_and_right(rig: Rig) -> None:
     assert rig.device.faults.active == ()
 
 
+def test_abort_names_object_and_code(rig: Rig) -> None:
+    """The abort code of the fault comes, at the first frame of a transfer."""
+    rig.inject(Fault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
+    assert rig.refused(0x6098, 35) == AbortCode.HARDWARE
+    answer = rig.raw_sdo(sdo.UploadRequest(0x6098, 0).encode())
+    assert sdo.decode_response(answer or b'') == sdo.Abort(0x6098, 0, AbortCode.HARDWARE)
+
+
 def test_silence_of_sdos(rig: Rig) -> None:
     """About one object, until it is ended; or for a number of requests; an empty frame is none."""
     rig.inject(Fault.SDO_SILENCE, object=(0x6064, 0))
@@ -157,15 +165,6 @@ def test_silence_of_sdos(rig: Rig) -> None:
     rig.inject(Fault.BLOCK_CRC)
     assert rig.raw_sdo(b'') is None
     assert answers(rig)
-
-
-def test_abort_names_object_and_code(rig: Rig) -> None:
-    """The abort code of the fault comes, at the first frame of a transfer."""
-    rig.inject(Fault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
-    assert rig.refused(0x6098, 35) == AbortCode.HARDWARE
-    answer = rig.raw_sdo(sdo.UploadRequest(0x6098, 0).encode())
-    assert answer is not None
-    assert sdo.decode_response(answer) == sdo.Abort(0x6098, 0, AbortCode.HARDWARE)
 
 
 def test_lost_tpdos_are_the_same_with_the_same_seed() -> None:
@@ -284,13 +283,10 @@ def test_device_without_power_is_silent_and_starts_anew(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize('kept', [True, False])
-def test_reboot_in_motion(rig: Rig, kept: bool) -> None:
+def test_reboot_in_motion(kept: bool) -> None:
     """The motor runs out; the position is kept, or counts from 0; nothing moves afterwards."""
-    rig.enable(3)
-    rig.put(0x60FF, 20_000)
-    rig.run(1.0)
+    rig = moving()
     where = rig.position
-    assert rig.velocity > 9_000
     rig.inject(Fault.REBOOT, position_kept=kept, duration=0.5)
     rig.run(0.6)
     assert rig.nmt_state is NmtState.PRE_OPERATIONAL
@@ -334,19 +330,14 @@ def test_a_fault_of_a_moment_and_a_lasting_one(rig: Rig) -> None:
         (Fault.OVER_TEMPERATURE, DriveState.FAULT_REACTION_ACTIVE),
         (Fault.ENCODER_LOSS, DriveState.FAULT),
     ):
-        rig = Rig()
-        rig.put(0x60FF, 2000)
-        rig.enable(3)
-        rig.run(1.0)
+        rig = moving()
         rig.inject(fault)
         assert rig.state is expected
 
 
-def test_safe_torque_off_is_no_fault(rig: Rig) -> None:
+def test_safe_torque_off_is_no_fault() -> None:
     """STO takes voltage and torque away; the drive goes on only after it is high again."""
-    rig.put(0x60FF, 2000)
-    rig.enable(3)
-    rig.run(1.0)
+    rig = moving()
     rig.inject(Fault.STO)
     assert rig.state is DriveState.SWITCH_ON_DISABLED
     assert (rig.statusword & 0x10, rig.get(0x6079), rig.get(0x603F)) == (0, 0, 0)
@@ -358,23 +349,12 @@ def test_safe_torque_off_is_no_fault(rig: Rig) -> None:
     assert rig.get(0x6041) & 0x6F == 0x27
 
 
-def test_stop_holds_a_torque() -> None:
-    """A torque against a stop is no fault; the motor rests there and moves when it is gone."""
-    rig = Rig()
-    rig.drive.block(100.0, rig.now)
-    rig.enable(4)
-    rig.put(0x6071, 200)
-    rig.run(2.0)
-    assert rig.position == pytest.approx(100.0)
-    assert rig.state is DriveState.OPERATION_ENABLED
-    rig.drive.release(rig.now)
-    rig.run(0.5)
-    assert rig.position > 200.0
-
-
 @pytest.mark.parametrize('mode', [4, 10])
 def test_load_pulls_unless_the_torque_holds_it(mode: int) -> None:
-    """With the torque of the load the axis stays; without, it goes where gravity pulls."""
+    """With the torque of the load the axis stays; without, it goes where gravity pulls.
+
+    A torque against a stop is no fault; the motor rests there and moves when it is gone.
+    """
     rig = Rig()
     rig.enable(8)
     rig.drive.set_load(300.0, rig.now)
@@ -388,6 +368,14 @@ def test_load_pulls_unless_the_torque_holds_it(mode: int) -> None:
     rig.run(0.5)
     assert rig.position < -50.0
     assert rig.velocity < 0.0
+    rig.drive.block(100.0, rig.now)
+    rig.put(0x6071, 500)
+    rig.run(3.0)
+    assert rig.position == pytest.approx(100.0)
+    assert rig.state is DriveState.OPERATION_ENABLED
+    rig.drive.release(rig.now)
+    rig.run(0.5)
+    assert rig.position > 200.0
 
 
 def test_axes_are_apart_and_share_their_errors() -> None:
@@ -443,35 +431,31 @@ def still(rig: Rig) -> bool:
 
 
 @pytest.mark.parametrize('mode', MODES)
-@pytest.mark.parametrize('loss', [NmtCommand.STOP, NmtCommand.RESET_COMMUNICATION])
-def test_drive_stops_when_it_is_taken_off_the_network(loss: NmtCommand, mode: int) -> None:
-    """In a fault that can be seen; in Pre-operational it goes on: its master speaks SDO to it."""
+@pytest.mark.parametrize('end', ['stop', 'reset communication', 'reset node', 'fault'])
+def test_nothing_moves_by_itself_afterwards(end: str, mode: int) -> None:
+    """Off the network the drive stops in a fault that can be seen; after a reset it runs out.
+
+    In Pre-operational it goes on: its master speaks SDO to it.
+    """
     rig = moving(mode)
     rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     rig.run(0.1)
-    assert rig.state is DriveState.OPERATION_ENABLED
-    assert rig.velocity == pytest.approx(500, abs=5)
-    rig.nmt(loss)
-    assert still(rig)
-    rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-    assert (rig.state, rig.get(0x603F)) == (DriveState.FAULT, 0x8130)
-    assert rig.get(0x1001) == 0x11
-
-
-@pytest.mark.parametrize('mode', MODES)
-@pytest.mark.parametrize('end', ['reset', 'fault'])
-def test_nothing_moves_by_itself_afterwards(end: str, mode: int) -> None:
-    """After a reset the motor runs out; it and a fault leave the drive where it stops."""
-    rig = moving(mode)
-    if end == 'reset':
-        rig.nmt(NmtCommand.RESET_NODE)
+    assert (rig.state, rig.velocity) == (DriveState.OPERATION_ENABLED, pytest.approx(500, abs=5))
+    if end == 'fault':
+        rig.drive.raise_fault(0x4310, rig.now)
+        rig.put(0x60FF, 0)
+    else:
+        rig.nmt(NmtCommand[end.upper().replace(' ', '_')])
+    if end == 'reset node':
         assert rig.nmt_state is NmtState.PRE_OPERATIONAL
         assert rig.state is DriveState.SWITCH_ON_DISABLED
         assert rig.velocity > 0
-    else:
-        rig.drive.raise_fault(0x4310, rig.now)
-        rig.put(0x60FF, 0)
     assert still(rig)
+    rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+    if end in {'stop', 'reset communication'}:
+        assert (rig.state, rig.get(0x603F)) == (DriveState.FAULT, 0x8130)
+        assert rig.get(0x1001) == 0x11
+        rig.put(0x60FF, 0)
     stopped = rig.get(0x6064)
     rig.command(0x00, FAULT_RESET, SHUTDOWN, SWITCH_ON, ENABLE)
     assert rig.state is DriveState.OPERATION_ENABLED
