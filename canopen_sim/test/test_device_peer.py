@@ -11,13 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 import threading
 import time
 from typing import Any
 
-from bus_rig import VirtualNetwork
 import can
 from can_addresses import free_virtual
 import canopen
@@ -26,6 +24,7 @@ from device_rig import EDS, NODE_ID, Rig
 from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
 
+from arm_canopen import CanopenMaster, DriveError
 from canopen_core.can import Frame, open_bus
 from canopen_core.can.plugin import ArmCanopenBus
 from canopen_core.eds import load_eds
@@ -309,84 +308,29 @@ def test_fault_reset_by_others(drive: Any) -> None:
     assert drive.emcy.active == []
 
 
-STRANGER_ID = 2
-NAME = 'stranger'
-NEVER = float('inf')
-
-
-@dataclass
-class Heartbeat:
-    """A message that python-canopen wants to be sent again and again."""
-
-    frame: Frame  # the message
-    period: float  # time between two in [s]
-    due: float  # when the next one is due in [s]
-
-    def stop(self) -> None:
-        """Send no more."""
-        self.due = NEVER
-
-    def modify_data(self, message: can.Message) -> None:
-        """Send something else from now on."""
-        self.frame = as_frame(message)
-
-
-def as_frame(message: can.Message) -> Frame:
-    """Return our frame for a message of python-can."""
-    return Frame(message.arbitration_id, bytes(message.data))
-
-
-class Stranger:
-    """A LocalNode of python-canopen as a station of the virtual network, and its bus."""
-
-    def __init__(self, network: VirtualNetwork) -> None:
-        self._network = network
-        self._periodic: list[Heartbeat] = []
-        make_network: Any = canopen.Network  # python-canopen has no types
-        self._others = make_network()
-        self._others.bus = self
-        self.node: Any = canopen.LocalNode(STRANGER_ID, str(DRIVE_EDS))
-        self._others.add_node(self.node)
-        network.connect(NAME, self)
-
-    def send(self, message: can.Message, timeout: float | None = None) -> None:
-        """Send for python-canopen."""
-        del timeout
-        self._network.send_as(NAME, as_frame(message))
-
-    def send_periodic(self, message: can.Message, period: float, **_: object) -> Heartbeat:
-        """Send again and again for python-canopen."""
-        task = Heartbeat(as_frame(message), period, self._network.now + period)
-        self._periodic.append(task)
-        return task
-
-    def receive(self, frame: Frame, now: float) -> None:
-        """Hand a frame to python-canopen."""
-        if not frame.is_remote:
-            self._others.notify(frame.can_id, bytearray(frame.data), now)
-
-    def next_deadline(self) -> float | None:
-        """Return when a heartbeat is due."""
-        return min((task.due for task in self._periodic if task.due < NEVER), default=None)
-
-    def advance(self, now: float) -> None:
-        """Send what is due."""
-        for task in self._periodic:
-            if task.due <= now:
-                task.due += task.period
-                self._network.send_as(NAME, task.frame)
-
-
+@pytest.mark.slow
 def test_master_boots_a_local_node_of_python_canopen() -> None:
     """Identity, configuration by SDO, heartbeat supervision and start go with a stranger."""
-    network = VirtualNetwork(bus_config(drive_config(NAME, STRANGER_ID)), absent=[NAME])
-    stranger = Stranger(network)
-    network.start()
-    remote = network.network.nodes[NAME]
-    network.run_until(lambda: remote.online, 20.0)
-    network.run_until(lambda: stranger.node.nmt.state == 'OPERATIONAL')
-    assert stranger.node.sdo[0x1017].raw == 100
-    assert stranger.node.sdo[0x6081].raw == 10_000
-    assert stranger.node.sdo[0x1A00][0].raw == 2
-    network.run(2.0)
-    assert remote.online, network.story()
+    name = free_virtual()
+    network = make_network()
+    network.NOTIFIER_CYCLE = 0.02
+    network.bus = ArmCanopenBus(name)
+    network.connect()
+    stranger: Any = canopen.LocalNode(2, str(DRIVE_EDS))
+    network.add_node(stranger)
+    with open_bus(name) as bus, open_bus(name) as observer:
+        master = CanopenMaster(bus_config(drive_config('stranger', 2)), bus)
+        try:
+            master.boot(2 * ARRIVAL)
+            wait(lambda: stranger.nmt.state == 'OPERATIONAL')
+            sdo = stranger.sdo
+            assert (sdo[0x1017].raw, sdo[0x6081].raw, sdo[0x1A00][0].raw) == (100, 10_000, 2)
+            observer.receive(0.0)
+            heartbeats = 0
+            while heartbeats < 10:  # three times as long as one may be missing
+                heartbeats += sum(each.can_id == 0x702 for each in observer.receive(ARRIVAL))
+            assert master.device('stranger').status().online
+        finally:
+            with pytest.raises(DriveError, match='no statusword yet'):  # it sends no PDOs
+                master.close()
+            network.disconnect()
