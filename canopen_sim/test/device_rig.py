@@ -4,7 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from drive_samples import drive_dictionary, DRIVE_EDS
+import pytest
 
 from arm_canopen import DriveState
 from canopen_core.can import Frame
@@ -218,3 +222,32 @@ class Rig:
         self.put(0x6060, mode)
         self.command(SHUTDOWN, SWITCH_ON, ENABLE)
         assert self.state is DriveState.OPERATION_ENABLED
+
+
+def moving(
+    mode: int = 3, objects: Mapping[int, int] = MappingProxyType({}), speed: int = 500
+) -> Rig:
+    """Return an Operational drive that moves at a speed in [inc/s], in mode 1, 3, 7 or 8."""
+    rig = Rig()
+    rig.nmt(NmtCommand.START)
+    for index, value in objects.items():
+        rig.put(index, value)
+    rig.put(0x6081, speed)
+    rig.put(0x60FF, speed)
+    rig.put(0x60C2, 250, 1)
+    rig.put(0x60C2, -2, 2)  # a line of 2.5 s
+    rig.enable(mode)
+    rig.put(0x607A, 5 * speed // 2)
+    rig.command(ENABLE | 0x10)
+    rig.put(0x60C1, 5 * speed // 2, 1)
+    rig.run(0.5)
+    assert rig.velocity == pytest.approx(speed, abs=5)
+    return rig
+
+
+def still(rig: Rig) -> bool:
+    """Return whether the motor stands, and goes on standing."""
+    rig.run(1.0)
+    position = rig.position
+    rig.run(5.0)
+    return rig.position == position

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from device_rig import EDS, ENABLE, FAULT_RESET, NODE_ID, Rig, SHUTDOWN, SWITCH_ON
+from device_rig import EDS, ENABLE, FAULT_RESET, moving, NODE_ID, Rig, SHUTDOWN, still, SWITCH_ON
 from drive_samples import drive_dictionary
 import pytest
 
@@ -402,32 +402,6 @@ def test_axes_are_apart_and_share_their_errors() -> None:
 # --- a moving drive that the network or a fault takes away from its master ---
 
 MODES = (1, 3, 7, 8)
-
-
-def moving(mode: int = 3) -> Rig:
-    """Return an Operational drive that moves at 500 inc/s or so, in any mode."""
-    rig = Rig()
-    rig.nmt(NmtCommand.START)
-    rig.put(0x6081, 500)
-    rig.put(0x60FF, 500)
-    rig.put(0x60C2, 250, 1)
-    rig.put(0x60C2, -2, 2)  # a line of 2.5 s
-    rig.enable(mode)
-    rig.command(ENABLE)
-    rig.put(0x607A, 1250)
-    rig.command(ENABLE | 0x10)
-    rig.put(0x60C1, 1250, 1)
-    rig.run(0.5)
-    assert rig.velocity == pytest.approx(500, abs=5)
-    return rig
-
-
-def still(rig: Rig) -> bool:
-    """Return whether the motor stands, and goes on standing."""
-    rig.run(1.0)
-    position = rig.position
-    rig.run(5.0)
-    return rig.position == position
 
 
 @pytest.mark.parametrize('mode', MODES)

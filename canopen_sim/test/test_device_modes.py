@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from device_rig import ENABLE, Rig, SHUTDOWN, SWITCH_ON
+from device_rig import ENABLE, moving, Rig, SHUTDOWN, SWITCH_ON
 from drive_samples import drive_dictionary, with_defaults
 import pytest
 
@@ -159,27 +159,6 @@ def test_velocity_stops_at_the_software_limit(direction: int) -> None:
     assert rig.get(0x606C) == -200 * direction
     rig.run(1.5)
     assert not rig.statusword & LIMIT
-
-
-def test_halt_in_velocity_mode() -> None:
-    """Halt ramps down to a stand, also one that was there at enabling; then the velocity comes."""
-    rig = Rig()
-    rig.put(0x60FF, 800)
-    rig.put(0x6060, 3)
-    rig.command(SHUTDOWN, SWITCH_ON, ENABLE | HALT)
-    rig.run(1.0)
-    assert rig.get(0x6064) == 0
-    rig.command(ENABLE)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 800
-    rig.command(ENABLE | HALT)
-    rig.put(0x60FF, 900)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 0
-    assert rig.statusword & REACHED
-    rig.command(ENABLE)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 900
 
 
 def test_velocity_mode_ramps_within_its_amounts() -> None:
@@ -370,14 +349,16 @@ def test_software_limits(target: int, arrives: int) -> None:
     assert rig.statusword & REACHED
 
 
+@pytest.mark.parametrize('mode', [1, 3, 7, 8])
 @pytest.mark.parametrize(('option', 'time'), [(1, 0.1), (2, 0.05)])
-def test_halt_and_resume(option: int, time: float) -> None:
-    """Halt ramps down as 0x605D selects and says when it stands; then the move goes on."""
-    rig = enabled(1, (0x605D, option))
-    offer(rig, 2000)
-    rig.run(1.0)
-    rig.command(ENABLE | HALT)
-    assert not rig.statusword & REACHED
+def test_halt(mode: int, option: int, time: float) -> None:
+    """Halt ramps down as 0x605D selects and says when it stands; a move and a velocity go on.
+
+    Set-points of a stream in it are ignored, one of a move waits, a velocity is the next one.
+    """
+    rig = moving(mode, {0x605D: option}, 1000)
+    rig.command(NEW | HALT)
+    assert not rig.statusword & (REACHED if mode == 1 else REACHED | FOLLOWS)
     start = rig.now
     while rig.velocity > 1.0:
         rig.run(0.001)
@@ -385,18 +366,34 @@ def test_halt_and_resume(option: int, time: float) -> None:
     rig.run(0.5)
     stopped = rig.get(0x6064)
     assert rig.statusword & REACHED
-    rig.run(1.0)
-    assert rig.get(0x6064) == stopped
-    rig.command(ENABLE)
-    assert not rig.statusword & REACHED
-    rig.run(2.0)
-    assert rig.get(0x6064) == 2000
-    rig.command(ENABLE | HALT)  # a set-point in it waits
-    rig.put(0x607A, 400)
+    rig.command(ENABLE | HALT)
+    rig.put(0x60FF, 900)
+    rig.put(0x60C1, 5000, 1)
+    rig.put(0x607A, 5000)
     rig.command(NEW | HALT)
-    assert rig.statusword & ACKNOWLEDGE
+    rig.cycles(50)
+    assert (rig.get(0x6064), rig.get(0x606C)) == (stopped, 0)
+    rig.command(NEW)
     rig.run(1.0)
-    assert rig.get(0x6064) == 2000
+    if mode == 3:
+        assert rig.get(0x606C) == 900
+        return
+    if mode in {7, 8}:
+        assert rig.get(0x6064) == stopped
+        rig.put(0x60C1, 5000, 1)
+        rig.put(0x607A, 5000)
+    rig.run(8.0)
+    assert rig.get(0x6064) == 5000
+
+
+def test_enabling_in_halt() -> None:
+    """Nothing moves; then the velocity comes."""
+    rig = Rig()
+    rig.put(0x60FF, 800)
+    rig.put(0x6060, 3)
+    rig.command(SHUTDOWN, SWITCH_ON, ENABLE | HALT)
+    rig.run(1.0)
+    assert rig.get(0x6064) == 0
     rig.command(ENABLE)
-    rig.run(2.0)
-    assert rig.get(0x6064) == 400
+    rig.run(1.0)
+    assert rig.get(0x606C) == 800

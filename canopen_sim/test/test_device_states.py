@@ -4,7 +4,16 @@
 
 from __future__ import annotations
 
-from device_rig import DISABLE_VOLTAGE, ENABLE, FAULT_RESET, QUICK_STOP, Rig, SHUTDOWN, SWITCH_ON
+from device_rig import (
+    DISABLE_VOLTAGE,
+    ENABLE,
+    FAULT_RESET,
+    moving,
+    QUICK_STOP,
+    Rig,
+    SHUTDOWN,
+    SWITCH_ON,
+)
 from drive_samples import drive_dictionary, with_defaults
 import pytest
 
@@ -116,18 +125,6 @@ def test_fault_reset_is_an_edge() -> None:
     assert rig.state is SOD
 
 
-def moving(options: dict[int, int]) -> Rig:
-    """Return a drive that turns at 1000 inc/s in profile velocity mode."""
-    rig = Rig()
-    for index, value in options.items():
-        rig.put(index, value)
-    rig.put(0x60FF, 1000)
-    rig.enable(3)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 1000
-    return rig
-
-
 def ramp(rig: Rig, duration: float = 1.0) -> tuple[float, float, list[State]]:
     """Return time to standstill, its distance, and the states on the way."""
     start, origin = rig.now, rig.position
@@ -170,7 +167,7 @@ def test_ways_to_stop(
     option: dict[int, int], words: list[int], time: float | None, states: list[State]
 ) -> None:
     """Option codes choose ramp and states after controlwords, or after a fault (no word)."""
-    rig = moving(option)
+    rig = moving(3, option, 1000)
     if not words:
         rig.drive.raise_fault(0x2310, rig.now)
     rig.command(*words)
@@ -188,7 +185,7 @@ def test_ways_to_stop(
 @pytest.mark.parametrize('word', [QUICK_STOP, SWITCH_ON])
 def test_enable_operation_calls_a_ramp_off(word: int) -> None:
     """That of a quick stop that stays (option 6), or of "disable operation": the drive goes on."""
-    rig = moving({0x605A: 6})
+    rig = moving(3, {0x605A: 6}, 1000)
     rig.command(word)
     rig.run(0.02)
     before = rig.velocity
@@ -201,7 +198,7 @@ def test_enable_operation_calls_a_ramp_off(word: int) -> None:
 
 def test_loss_of_voltage_ends_a_fault_reaction() -> None:
     """Without voltage there is no ramp any more."""
-    rig = moving({})
+    rig = moving()
     rig.drive.raise_fault(0x2310, rig.now)
     rig.run(0.01)
     rig.drive.set_voltage(False)
@@ -210,7 +207,7 @@ def test_loss_of_voltage_ends_a_fault_reaction() -> None:
 
 def test_enabling_a_motor_that_runs_out_does_not_jerk() -> None:
     """A motor that is still coasting is caught at its velocity and stopped."""
-    rig = moving({0x605C: 0})
+    rig = moving(3, {0x605C: 0}, 1000)
     rig.put(0x60FF, 0)
     rig.command(DISABLE_VOLTAGE)
     rig.run(0.01)

@@ -174,29 +174,6 @@ def test_software_limits(mode: int) -> None:
     assert not rig.statusword & LIMIT
 
 
-@pytest.mark.parametrize('mode', MODES)
-def test_halt(mode: int) -> None:
-    """Halt ramps down; set-points in it are ignored, and the next one after it is obeyed."""
-    word = MODES[mode][2]
-    rig = streaming(mode)
-    stream(rig, range(50))
-    assert rig.statusword & BIT12
-    rig.command(word | HALT)
-    assert not rig.statusword & BIT12
-    target(rig, 5000)
-    rig.cycles(30)
-    stopped = rig.get(0x6064)
-    assert rig.get(0x606C) == 0
-    assert stopped < 600
-    rig.command(word)
-    rig.cycles(10)
-    assert rig.get(0x6064) == stopped
-    target(rig, stopped + 10)
-    rig.sync()
-    rig.run(1.0)
-    assert rig.get(0x6064) == stopped + 10
-
-
 def test_interpolation_needs_its_bit() -> None:
     """In mode 7 set-points count only while bit 4 is set; taking it back stops the axis."""
     rig = streaming(7)
