@@ -280,54 +280,32 @@ def listed(problems: tuple[Problem, ...], said: str) -> list[Problem]:
     return [each for each in problems if re.search(said, f'{each.message}; {each.remedy}')]
 
 
-def assert_found(problems: tuple[Problem, ...], text: str, case: Case) -> None:
-    """Assert that a case is found at its line and key."""
-    line = next(i for i, row in enumerate(text.splitlines(), 1) if HERE in row)
-    path = case.path
+TABLES = (
+    ('errors', REFUSED, BUS, eds_text()),
+    ('errors', LACKING, BUS, WITHOUT_HEARTBEAT),
+    ('errors', ERRORS, CLEAN, RICH_EDS),  # although each key by itself is fine
+    ('warnings', WARNINGS, CLEAN, RICH_EDS),  # it can be loaded all the same
+)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'case', 'base', 'eds'),
+    [(kind, case, base, eds) for kind, cases, base, eds in TABLES for case in cases],
+    ids=[f'{kind}-{case.piece}' for kind, cases, *_ in TABLES for case in cases],
+)
+def test_what_is_found(tmp_path: Path, kind: str, case: Case, base: str, eds: str) -> None:
+    """At its line and key, with a remedy: what is refused, and what runs and disappoints."""
+    first, *rest = case.piece.split('\n')
+    piece = case.piece if HERE in case.piece else '\n'.join([f'{first} {HERE}', *rest])
+    text = added(case.section, piece, base)
+    report = report_of(tmp_path, text, eds)
+    assert kind == 'errors' or report.errors == ()
+    problems = report.errors if kind == 'errors' else report.warnings
     found = [each for each in listed(problems, case.said) if each.remedy]
-    if '$' in path or '^' in path:  # of what stands around it
-        assert found, problems
-        return
-    assert (line, path) in [(each.line, each.key) for each in found], problems
-
-
-def marked(case: Case, base: str) -> str:
-    """Return the text of a case, with its mark."""
-    piece = case.piece
-    if HERE not in piece:
-        first, *rest = piece.split('\n')
-        piece = '\n'.join([f'{first} {HERE}', *rest])
-    return added(case.section, piece, base)
-
-
-@pytest.mark.parametrize('case', REFUSED, ids=lambda case: case.piece)
-def test_what_is_wrong_is_refused(tmp_path: Path, case: Case) -> None:
-    """The file cannot be loaded, and says where and why."""
-    text = marked(case, BUS)
-    assert_found(report_of(tmp_path, text, eds_text()).errors, text, case)
-
-
-@pytest.mark.parametrize('case', LACKING, ids=lambda case: case.piece)
-def test_what_the_eds_lacks_is_refused(tmp_path: Path, case: Case) -> None:
-    """A missing EDS or object is reported at the key that wants it."""
-    text = marked(case, BUS)
-    assert_found(report_of(tmp_path, text, WITHOUT_HEARTBEAT).errors, text, case)
-
-
-@pytest.mark.parametrize('case', WARNINGS, ids=lambda case: case.piece)
-def test_what_runs_and_disappoints_is_a_warning(tmp_path: Path, case: Case) -> None:
-    """It can be loaded all the same."""
-    text = marked(case, CLEAN)
-    report = report_of(tmp_path, text)
-    assert report.errors == ()
-    assert_found(report.warnings, text, case)
-
-
-@pytest.mark.parametrize('case', ERRORS, ids=lambda case: case.piece)
-def test_what_cannot_work_is_an_error(tmp_path: Path, case: Case) -> None:
-    """Although each key by itself is fine."""
-    text = marked(case, CLEAN)
-    assert_found(report_of(tmp_path, text).errors, text, case)
+    assert found, problems
+    if '$' not in case.path and '^' not in case.path:  # else it is of what stands around it
+        line = next(i for i, row in enumerate(text.splitlines(), 1) if HERE in row)
+        assert (line, case.path) in [(each.line, each.key) for each in found], problems
 
 
 @pytest.mark.parametrize('piece', ['', *SILENT])

@@ -30,7 +30,6 @@ from arm_canopen.joints import (
     Joints,
     JointSample,
     JointSet,
-    movable_joints,
     SilenceWatch,
     STALE_AFTER,
     START_TIMEOUT,
@@ -40,6 +39,7 @@ from arm_canopen.nodes.output_thread import OutputThread
 
 DEADLINE = 10.0  # [s] for what takes milliseconds
 URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="flange" type="fixed"><parent link="d"/><child link="e"/></joint><link name="e"/>
 <joint name="elbow" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 <joint name="shoulder" type="continuous"><parent link="b"/><child link="c"/>
@@ -134,7 +134,7 @@ def test_the_joints_of_the_robot_have_the_stamp_of_the_sync(scene: Scene) -> Non
 
 @pytest.mark.slow
 def test_the_urdf_gives_the_order_and_joints_that_mimic(scene: Scene) -> None:
-    """From the topic of robot_state_publisher."""
+    """From the topic of robot_state_publisher; fixed ones have no state."""
     latched = QoSProfile(  # type: ignore[no-untyped-call]
         depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
     )
@@ -311,17 +311,6 @@ def test_a_clock_that_is_set_back_does_not_stop_the_sets() -> None:
         for name in NAMES:
             publisher.receive(name, cycle)
     assert [state.stamp // PERIOD_NS for state in publisher.sets] == [10, 11, 12]
-
-
-def test_joints_with_one_variable_in_the_order_of_the_urdf() -> None:
-    """Fixed ones have no state here."""
-    kinds = {'z': 'revolute', 'flange': 'fixed', 'a': 'continuous'}
-    links = ''.join(f'<link name="{name}"/>' for name in ('base', *(f'{each}1' for each in kinds)))
-    parts = ''.join(
-        f'<joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}1"/></joint>'
-        for name, kind in kinds.items()
-    )
-    assert [*movable_joints(f'<robot name="r">{links}{parts}</robot>')] == ['z', 'a']
 
 
 PERIOD = 2.0  # [s] between two looks

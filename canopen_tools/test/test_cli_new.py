@@ -138,28 +138,16 @@ def running(bus_yml: Path) -> Iterator[CanopenMaster]:
         yield master
 
 
-@pytest.mark.parametrize(
-    ('units', 'velocity'),
-    [
-        (['--turn', 'arm=-409600'], -60 * 100 / TURN),
-        (['--metre', 'arm=50000'], 60 * 100),
-        ([], 60 * 100 / TURN),  # the factor group says what an increment is
-    ],
-)
-def test_a_drive_that_counts_in_rpm_follows(
-    tmp_path: Path, units: Sequence[str], velocity: float
-) -> None:
+def test_a_drive_that_counts_in_rpm_follows(tmp_path: Path) -> None:
     """By its formula, and so does the simulated drive: 0x607F of 3000 is no 3000 increments."""
     limit = replace(CYCLIC_AND_PROFILE, index=0x607F, access='rw', default='3000')
     window = replace(limit, index=0x6065, default='20000')
     eds = written(tmp_path, 'drive.eds', [*SAMPLE, limit, window])
     bus_yml = tmp_path / 'robot' / 'bus.yml'
-    rpm = [*units, '--rpm', 'arm=100']
-    assert main(['new', f'arm={eds}@2', *rpm, '--output', str(bus_yml)]) == 0
-    assert '# rpm, 100 turns for ' in bus_yml.read_text()
+    units = ['--turn', 'arm=-409600', '--rpm', 'arm=100']
+    assert main(['new', f'arm={eds}@2', *units, '--output', str(bus_yml)]) == 0
     (node,) = load_bus(bus_yml).nodes
-    assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
-    assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
+    assert node.drive.scale_vel_to_dev == pytest.approx(-60 * 100 / TURN)
     with running(bus_yml) as master:
         follow(master, 'arm', 0.5)
 
@@ -186,6 +174,7 @@ FACTOR = (
         ([COUNTS], ['--turn', 'arm=-1000'], -1000 / TURN, '0x60A9 of the EDS: its unit is 1 incr'),
         # 0x60A9 and 0x6096 are overruled
         ([COUNTS, *FACTOR], ['--turn', 'arm=9', '--rpm', 'arm=2'], 120 / TURN, '# rpm, 2 turns'),
+        ([], ['--rpm', 'arm=100'], 60 * 100 / TURN, '# rpm, 100 turns for '),
         # 0x6096 alone; torque turns with the position
         (FACTOR, ['--turn', 'arm=-4096', '--mode', 'arm=1'], -60 / TURN, 'by 0x6096 of the EDS'),
     ],
