@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 import time
-from typing import cast
+from types import SimpleNamespace
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,7 +24,6 @@ from std_msgs.msg import String
 from urdf_reader import Mimic
 
 from arm_canopen import CanopenError
-from arm_canopen.cia402.state import AxisState
 from arm_canopen.joints import (
     JointAggregator,
     Joints,
@@ -49,15 +48,11 @@ URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link 
 <mimic joint="elbow" multiplier="2"/></joint></robot>"""
 
 
-@dataclass
-class Axis:
-    """What is needed of the state of an axis."""
-
-    name: str
-    position: float
-    velocity: float = 0.0
-    effort: float = 0.0
-    fresh: bool = True
+def axis_of(name: str, position: float, velocity: float = 0.0, effort: float = 0.0) -> Any:
+    """Return what is needed of the state of an axis."""
+    return SimpleNamespace(
+        name=name, position=position, velocity=velocity, effort=effort, fresh=True
+    )
 
 
 class Scene:
@@ -66,8 +61,8 @@ class Scene:
     def __init__(self, node: Node) -> None:
         """Make them."""
         self.node = node
-        self.axes = [Axis('shoulder', 0.1, 0.2, 0.3), Axis('elbow', 0.4, 0.5, 0.6)]
-        self.drive = DriveJointStates(node, cast('list[AxisState]', self.axes))
+        axes = [axis_of('shoulder', 0.1, 0.2, 0.3), axis_of('elbow', 0.4, 0.5, 0.6)]
+        self.drive = DriveJointStates(node, axes)
         self.output = OutputThread(node.get_logger())  # type: ignore[no-untyped-call]
         self.bus = BusJointStates(node, [self.drive], self.output)
         self.received: dict[str, JointState] = {}
@@ -157,8 +152,7 @@ def test_drives_that_the_urdf_lacks_are_named_once(
     """They keep their own topics; where it lacks all of them, that of the robot, too."""
     names = [(first, 'tool'), ('left', 'right')]
     drives = [
-        DriveJointStates(scene.node, cast('list[AxisState]', [Axis(axis, 0.7) for axis in axes]))
-        for axes in names
+        DriveJointStates(scene.node, [axis_of(axis, 0.7) for axis in axes]) for axes in names
     ]
     scene.bus = BusJointStates(scene.node, drives, scene.output)
     scene.bus.publish_robot(URDF)
@@ -174,8 +168,8 @@ def test_drives_that_the_urdf_lacks_are_named_once(
 @pytest.mark.slow
 def test_a_drive_that_is_not_fresh_is_left_out_after_a_while(scene: Scene) -> None:
     """What is not known is not invented; the drive comes back with its TPDOs."""
-    other = Axis('wrist', 0.7)
-    drives = [scene.drive, DriveJointStates(scene.node, cast('list[AxisState]', [other]))]
+    other = axis_of('wrist', 0.7)
+    drives = [scene.drive, DriveJointStates(scene.node, [other])]
     scene.bus = BusJointStates(scene.node, drives, scene.output)
     scene.bus.publish_robot('')
     scene.listen('/joint_states')

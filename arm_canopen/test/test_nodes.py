@@ -205,6 +205,7 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
     """It says that the drives could not be stopped, and raises nothing."""
     bus = VirtualBus('here', VirtualWire())
     process = MasterProcess(node, CONFIG, bus, diagnostics_period=60.0)
+    source: Any = SimpleNamespace(axes=())
     before = set(threading.enumerate())
     process.start()
     started = set(threading.enumerate()) - before
@@ -214,7 +215,7 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
     cycle.join(DEADLINE)
     assert not cycle.is_alive()
     with pytest.raises(BusError):
-        process.attach(NoSource()).result(DEADLINE)
+        process.attach(source).result(DEADLINE)
     process.stop()
     assert not any(thread.is_alive() for thread in started)
     bus.close()
@@ -267,19 +268,6 @@ def test_all_are_operational_after_the_last_of_them(
     assert f'all {count} devices operational' in lines[-2]
     assert 'devices operational' not in ''.join(lines[:-2])
     bus.close()
-
-
-class NoSource:
-    """A motion source without axes."""
-
-    axes = ()
-
-    def update(self, *_: object) -> tuple[()]:
-        """Answer nothing."""
-        return ()
-
-    def released(self, *_: object) -> None:
-        """Lose nothing."""
 
 
 RAW = st.integers(0, 0xFFFF_FFFF)
