@@ -521,22 +521,17 @@ def test_a_drive_without_eds_is_a_drive_of_the_standard(tmp_path: Path) -> None:
     assert all(pdo.configured for pdo in (*node.tpdos, *node.rpdos) if pdo.enabled)
 
 
-@pytest.mark.parametrize(
-    ('eds', 'words', 'fixed'),
-    [
+def test_odd_mappings_of_an_eds_are_taken_as_far_as_they_are_understood(tmp_path: Path) -> None:
+    """So that the device is read as it sends."""
+    for eds, words, fixed in (
         (fixed_tpdos(), [0x6041_0010], True),  # read-only: used as it is, and marked so
         (with_default_mapping('0x70000020'), [0x7000_0020], False),  # unknown: by its length
         # bit 7 of a length belongs to the vendor
         (with_default_mapping('0x60410090', '0x606400A0'), [0x6041_0010, 0x6064_0020], False),
-    ],
-)
-def test_odd_mappings_of_an_eds_are_taken_as_far_as_they_are_understood(
-    tmp_path: Path, eds: str, words: list[int], fixed: bool
-) -> None:
-    """So that the device is read as it sends."""
-    (node,) = load_text(tmp_path, eds=eds).nodes
-    assert [mapped.word for mapped in node.tpdos[1].mapping] == words
-    assert [pdo.fixed_mapping for pdo in node.tpdos] == [fixed] * 6
+    ):
+        (node,) = load_text(tmp_path, eds=eds).nodes
+        assert [mapped.word for mapped in node.tpdos[1].mapping] == words, eds
+        assert [pdo.fixed_mapping for pdo in node.tpdos] == [fixed] * 6, eds
 
 
 def test_sync_that_is_missing(tmp_path: Path) -> None:
@@ -572,25 +567,22 @@ def test_load(tmp_path: Path, bitrate: int, kind: str | None) -> None:
     assert bool(listed(report.warnings, 'frames/s')) == (kind == 'warning')
 
 
-@pytest.mark.parametrize(
-    ('keys', 'service', 'reason', 'rate'),
-    [
+def test_rates(tmp_path: Path) -> None:
+    """Each kind of TPDO has its rate, and the reason is reported; guarding is sent both ways."""
+    for keys, service, reason, rate in (
         (TPDO_2.format('event_timer: 50'), 'TPDO 2', 'on change, taken as every 10 ms', 100),
         (TPDO_2.format('inhibit_time: 400'), 'TPDO 2', 'taken as every 40 ms', 25),
         (TPDO_2.format('event_timer: 10'), 'TPDO 2', 'event timer 10 ms', 100),
         (TPDO_2.format('transmission: 5'), 'TPDO 2', 'every 5th SYNC', 20),
         (TPDO_2.format('transmission: 0'), 'TPDO 2', 'with SYNC on change', 100),
         ('heartbeat_producer: 0\nguard_time: 200', 'guarding', '', 5),
-    ],
-)
-def test_rates(tmp_path: Path, keys: str, service: str, reason: str, rate: float) -> None:
-    """Each kind of TPDO has its rate, and the reason is reported; guarding is sent both ways."""
-    report = report_of(tmp_path, added('joint1', keys, CLEAN))
-    assert report.load is not None
-    found = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', service)]
-    assert [item.rate for item in found] == pytest.approx([rate] * len(found))
-    assert reason in found[0].reason
-    assert [t.size for t in found] == ([0, 1] if service == 'guarding' else [4])
+    ):
+        report = report_of(tmp_path, added('joint1', keys, CLEAN))
+        assert report.load is not None, keys
+        found = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', service)]
+        assert [item.rate for item in found] == pytest.approx([rate] * len(found)), keys
+        assert reason in found[0].reason, keys
+        assert [t.size for t in found] == ([0, 1] if service == 'guarding' else [4]), keys
 
 
 @pytest.mark.parametrize(

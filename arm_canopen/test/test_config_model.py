@@ -21,9 +21,9 @@ from canopen_core.standard import CAN_ID_MASK, DataType
 DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 
 
-@pytest.mark.parametrize(
-    ('section', 'piece', 'attribute', 'value'),
-    [
+def test_keys(tmp_path: Path) -> None:
+    """Each key fills its attribute, times in seconds."""
+    for section, piece, attribute, value in (
         ('joint1', 'remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
         ('joint1', 'sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
         ('joint1', 'heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
@@ -47,12 +47,9 @@ DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
         ('master', 'sync_period: 5000', 'cycle_period', 0.005),
         ('master', 'heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
         ('master', 'heartbeat_producer: 100\nheartbeat_multiplier: 5', 'heartbeat_timeout', 0.5),
-    ],
-)
-def test_keys(tmp_path: Path, section: str, piece: str, attribute: str, value: object) -> None:
-    """Each key fills its attribute, times in seconds."""
-    bus = load_text(tmp_path, added(section, piece))
-    assert attrgetter(attribute)(bus.master if section == 'master' else bus.nodes[0]) == value
+    ):
+        bus = load_text(tmp_path, added(section, piece))
+        assert attrgetter(attribute)(bus.master if section == 'master' else bus.nodes[0]) == value
 
 
 def test_supervision_of_heartbeats(tmp_path: Path) -> None:
@@ -221,25 +218,19 @@ def test_own_values_beat_the_defaults(tmp_path: Path) -> None:
     assert [mapped.index for mapped in node.tpdos[1].mapping] == [0x6064]
 
 
-@pytest.mark.parametrize(
-    ('own', 'expected'),
-    [
+def test_lists_of_writes_merge_by_object(tmp_path: Path) -> None:
+    """A device adds to the defaults' writes or replaces single ones; an empty list drops all."""
+    for own, expected in (
         ('', [(0x6081, 1), (0x6083, 2)]),
         ('sdo: [{index: 0x6084, value: 3}]', [(0x6081, 1), (0x6083, 2), (0x6084, 3)]),
         ('sdo: [{index: 0x6081, value: 9}]', [(0x6083, 2), (0x6081, 9)]),
         ('sdo: []', []),
         ('error_behavior: {1: 2}', [(0x1029, 2), (0x6081, 1), (0x6083, 2)]),
-    ],
-    ids=['defaults only', 'another object', 'the same object', 'empty list', 'error behaviour'],
-)
-def test_lists_of_writes_merge_by_object(
-    tmp_path: Path, own: str, expected: list[tuple[int, int]]
-) -> None:
-    """A device adds to the defaults' writes or replaces single ones; an empty list drops all."""
-    text = added('joint1', own, added('defaults', DEFAULTS))
-    (node,) = load_text(tmp_path, text).nodes
-    writes = [(write.index, int.from_bytes(write.data, 'little')) for write in node.sdo_writes]
-    assert writes == expected
+    ):
+        text = added('joint1', own, added('defaults', DEFAULTS))
+        (node,) = load_text(tmp_path, text).nodes
+        writes = [(write.index, int.from_bytes(write.data, 'little')) for write in node.sdo_writes]
+        assert writes == expected, own
 
 
 @pytest.mark.parametrize(

@@ -34,9 +34,9 @@ def units_of(folder: Path, piece: str, *, eds: str = EDS) -> AxisUnits:
     return units
 
 
-@pytest.mark.parametrize(
-    ('piece', 'rule', 'increments', 'radians'),
-    [
+def test_what_one_means(tmp_path: Path) -> None:
+    """In increments and in radians, and by which rule; objects count as boot leaves them."""
+    for piece, rule, increments, radians in (
         ('mandatory: false', UnitRule.UPSTREAM, 1000.0, 0.01),
         ('scale_pos_to_dev: 1000', UnitRule.BUS_YML, 1000.0, 0.01),
         ('scale_pos_to_dev: 200000\nscale_pos_from_dev: 5e-6', UnitRule.BUS_YML, 200_000, 2.0),
@@ -47,16 +47,11 @@ def units_of(folder: Path, piece: str, *, eds: str = EDS) -> AxisUnits:
             50_000.0,
             1.0,
         ),
-    ],
-)
-def test_what_one_means(
-    tmp_path: Path, piece: str, rule: UnitRule, increments: float, radians: float
-) -> None:
-    """In increments and in radians, and by which rule; objects count as boot leaves them."""
-    units = units_of(tmp_path, piece)
-    assert units.rule is rule
-    assert units.increments == pytest.approx(increments, rel=1e-6)
-    assert units.radians == pytest.approx(radians, rel=1e-6)
+    ):
+        units = units_of(tmp_path, piece)
+        assert units.rule is rule, piece
+        assert units.increments == pytest.approx(increments, rel=1e-6), piece
+        assert units.radians == pytest.approx(radians, rel=1e-6), piece
 
 
 def test_a_key_of_defaults_is_warned_of_once_with_all_its_drives(tmp_path: Path) -> None:
@@ -90,9 +85,9 @@ RATES = 'scale_vel_to_dev: 1000\nscale_vel_from_dev: 0.001'
 IN_RPM = 'scale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472'
 
 
-@pytest.mark.parametrize(
-    ('piece', 'units'),
-    [
+def test_the_units_of_velocities_and_accelerations(tmp_path: Path) -> None:
+    """By the ratio of the scales, where these have one of their own."""
+    for piece, units in (
         ('mandatory: false', (1.0, 1.0)),
         (POSITIONS, (1.0, 1.0)),
         (f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5', (1.0, 1.0)),
@@ -100,58 +95,51 @@ IN_RPM = 'scale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472'
         (f'{POSITIONS}\n{IN_RPM}\nscale_acc_to_dev: 5729.58', (6000.0, 10.0)),
         (f'{POSITIONS}\nscale_acc_from_dev: 1.745329e-6', (1.0, 0.1)),
         ('scale_from_factor_group: true', (1.0, 1.0)),
-    ],
-)
-def test_the_units_of_velocities_and_accelerations(
-    tmp_path: Path, piece: str, units: tuple[float, float]
-) -> None:
-    """By the ratio of the scales, where these have one of their own."""
-    bus = load_text(tmp_path, added(JOINT, piece), eds=EDS)
-    (node,) = bus.nodes
-    assert rate_units(bus, node, node.drive) == pytest.approx(units, rel=1e-3)
+    ):
+        bus = load_text(tmp_path, added(JOINT, piece), eds=EDS)
+        (node,) = bus.nodes
+        assert rate_units(bus, node, node.drive) == pytest.approx(units, rel=1e-3), piece
 
 
 TENTHS_OF_RPM = 'sdo: [{index: 0x60A9, value: 0x00B44700}, {index: 0x60AA, value: 0xFFC00300}]'
 
 
-@pytest.mark.parametrize(
-    ('piece', 'acceleration', 'by'),
-    [
+def test_what_one_is_of_accelerations(tmp_path: Path) -> None:
+    """By bus.yml, by the drive, or assumed, with a warning beside a scale of velocities."""
+    for piece, acceleration, by in (
         ('mandatory: false', 1000.0, ''),
         (f'{POSITIONS}\n{IN_RPM}', -9.549, ''),
         (f'{POSITIONS}\n{IN_RPM}\nscale_acc_to_dev: 95.49', 95.49, 'scale_acc_to_dev'),
         (f'{POSITIONS}\n{IN_RPM}\n{TENTHS_OF_RPM}', -95.49, '0x60A9, 0x60AA'),
         ('scale_from_factor_group: true', 100_000.0, ''),
-    ],
-)
-def test_what_one_is_of_accelerations(
-    tmp_path: Path, piece: str, acceleration: float, by: str
-) -> None:
-    """By bus.yml, by the drive, or assumed, with a warning beside a scale of velocities."""
-    rows = (
-        Row(0x60A9, 0, 'SI unit velocity', 7, 'rw', '0'),
-        Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0'),
-        Row(0x6083, 0, 'Profile acceleration', 7, 'rw', '3000'),
-    )
-    eds = eds_text((*DRIVE_ROWS, *FACTOR_ROWS, *rows))
-    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=eds))
-    (units,) = report.units
-    assert units.acceleration == pytest.approx(acceleration, rel=1e-4)
-    assert units.acceleration_by == by
-    assert units.motion[Index.PROFILE_ACCELERATION] == pytest.approx(
-        3000.0 / abs(acceleration), rel=1e-4
-    )
-    found = [each for each in report.warnings if '1.0 per s2 is assumed' in each.message]
-    assert len(found) == (not by and units.rule is not UnitRule.UPSTREAM)
+    ):
+        rows = (
+            Row(0x60A9, 0, 'SI unit velocity', 7, 'rw', '0'),
+            Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0'),
+            Row(0x6083, 0, 'Profile acceleration', 7, 'rw', '3000'),
+        )
+        eds = eds_text((*DRIVE_ROWS, *FACTOR_ROWS, *rows))
+        report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=eds))
+        (units,) = report.units
+        assert units.acceleration == pytest.approx(acceleration, rel=1e-4), piece
+        assert units.acceleration_by == by, piece
+        assert units.motion[Index.PROFILE_ACCELERATION] == pytest.approx(
+            3000.0 / abs(acceleration), rel=1e-4
+        )
+        found = [each for each in report.warnings if '1.0 per s2 is assumed' in each.message]
+        assert len(found) == (not by and units.rule is not UnitRule.UPSTREAM), piece
 
 
 BOTH = f'{POSITIONS}\n{RATES}\n'
 LEFT = 'moves at 0.01745 where 1.0 is asked.* scale_vel_to_dev: -57295.8 .*joint: -9.549297'
 
 
-@pytest.mark.parametrize(
-    ('piece', 'said'),
-    [
+def test_scales_and_offsets_that_move_something_else(tmp_path: Path) -> None:
+    """Positions in rad beside velocities by 1000, a shown position that is no target, rounding.
+
+    What is not said begins with an exclamation mark.
+    """
+    for piece, said in (
         (POSITIONS, LEFT),
         (BOTH, '!velocities the default'),  # written, and so meant
         (f'{POSITIONS}\nscale_vel_to_dev: 5\nscale_vel_from_dev: 0.2', '!velocities the default'),
@@ -164,20 +152,12 @@ LEFT = 'moves at 0.01745 where 1.0 is asked.* scale_vel_to_dev: -57295.8 .*joint
         (f'{BOTH}offset_pos_from_dev: 0.5\noffset_pos_to_dev: -28647.89', 'cancel.*: 28647.89'),
         ('scale_pos_to_dev: 0.0001\nscale_pos_from_dev: 10000', 'correct scale_pos_to_dev'),
         ('scale_vel_to_dev: 0.0001\nscale_vel_from_dev: 10000', 'correct scale_vel_to_dev'),
-    ],
-)
-def test_scales_and_offsets_that_move_something_else(
-    tmp_path: Path, piece: str, said: str
-) -> None:
-    """Positions in rad beside velocities by 1000, a shown position that is no target, rounding.
-
-    What is not said begins with an exclamation mark.
-    """
-    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=EDS))
-    pattern = said.removeprefix('!')
-    found = [w for w in report.warnings if re.search(pattern, f'{w.message}; {w.remedy}')]
-    assert len(found) == (pattern == said)
-    assert all(warning.key.startswith('nodes.joint1.') for warning in found)
+    ):
+        report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=EDS))
+        pattern = said.removeprefix('!')
+        found = [w for w in report.warnings if re.search(pattern, f'{w.message}; {w.remedy}')]
+        assert len(found) == (pattern == said), piece
+        assert all(warning.key.startswith('nodes.joint1.') for warning in found), piece
 
 
 def check(mode: OperationMode, units: Units, target: float) -> None:

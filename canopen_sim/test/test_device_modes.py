@@ -230,25 +230,22 @@ def test_torques() -> None:
 # --- profile position (1) ---
 
 
-@pytest.mark.parametrize(
-    ('words', 'arrives'),
-    [
+def test_a_rising_edge_of_bit_4_hands_over() -> None:
+    """Nothing else does."""
+    for words, arrives in (
         ((SHUTDOWN, SWITCH_ON, ENABLE), 0),  # a target alone
         ((SHUTDOWN, SWITCH_ON, ENABLE, NEW), 300),  # held afterwards: one set-point
         ((SHUTDOWN, SWITCH_ON, NEW), 300),  # enables and offers in one
-        ((0x16, 0x17, NEW), 0),  # no edge: the bit was there before
-    ],
-)
-def test_a_rising_edge_of_bit_4_hands_over(words: tuple[int, ...], arrives: int) -> None:
-    """Nothing else does."""
-    rig = Rig()
-    rig.put(0x6060, 1)
-    rig.put(0x607A, 300)
-    rig.command(*words)
-    rig.run(2.0)
-    rig.put(0x607A, 900)
-    rig.run(1.0)
-    assert rig.get(0x6064) == arrives
+        ((0x16, 0x17, NEW), 0),  # no edge: the bit was there before,
+    ):
+        rig = Rig()
+        rig.put(0x6060, 1)
+        rig.put(0x607A, 300)
+        rig.command(*words)
+        rig.run(2.0)
+        rig.put(0x607A, 900)
+        rig.run(1.0)
+        assert rig.get(0x6064) == arrives, words
 
 
 def test_the_profile_is_that_of_the_hand_over() -> None:

@@ -13,14 +13,7 @@ from eds_samples import eds_text
 import pytest
 
 from arm_canopen import BusConfig, load_bus, NodeConfig, Severity
-from arm_canopen.config import (
-    boot_writes,
-    BootWrite,
-    consumer_to_read,
-    held_after_boot,
-    HeldConsumers,
-    Identity,
-)
+from arm_canopen.config import boot_writes, BootWrite, consumer_to_read, held_after_boot, Identity
 from arm_canopen.config.model.boot_plan import WATCH_KEY
 from arm_canopen.master.configuration import Configurator
 from canopen_core.standard import ObjectDictionary, pdo_object
@@ -127,28 +120,23 @@ def test_take_over_and_diff_find_what_boot_leaves_and_every_change_of_it(held: i
         variable.value = before
 
 
-@pytest.mark.parametrize(
-    ('entries', 'taken'),
-    [
+def test_which_entries_are_read_and_which_one_is_the_masters() -> None:
+    """Up to the first that is free; entry 2 belongs to the DCF."""
+    for entries, taken in (
         ({1: 0}, 1),
         ({1: OTHER, 3: 0}, 3),
         ({1: OTHER, 3: 1 << 16 | 100}, 3),  # the master's, from before
         ({1: OTHER, 3: OTHER, 4: OTHER}, None),
         ({1: None}, 1),  # it cannot be read, and may be free
-        ({1: OTHER, 3: None}, None),  # the EDS promises more than the device has
-    ],
-)
-def test_which_entries_are_read_and_which_one_is_the_masters(
-    entries: HeldConsumers, taken: int | None
-) -> None:
-    """Up to the first that is free; entry 2 belongs to the DCF."""
-    scene = Scene(0)
-    held: dict[int, int | None] = {}
-    while (subindex := consumer_to_read(scene.config, scene.node, held)) is not None:
-        held[subindex] = entries[subindex]
-    assert held == entries
-    writes = boot_writes(scene.config, scene.node, held)
-    assert [w.subindex for w in writes if w.key == WATCH_KEY] == ([taken] if taken else [])
+        ({1: OTHER, 3: None}, None),  # the EDS promises more than the device has,
+    ):
+        scene = Scene(0)
+        held: dict[int, int | None] = {}
+        while (subindex := consumer_to_read(scene.config, scene.node, held)) is not None:
+            held[subindex] = entries[subindex]
+        assert held == entries, entries
+        writes = boot_writes(scene.config, scene.node, held)
+        assert [w.subindex for w in writes if w.key == WATCH_KEY] == ([taken] if taken else [])
 
 
 def test_a_complete_dcf_holds_the_plan() -> None:
@@ -235,25 +223,20 @@ def test_a_value_that_is_not_the_default_is_written_at_boot(tmp_path: Path) -> N
     assert booted(both.nodes[0], plain.dictionary).read(0x2000) == b'\x09\x00'
 
 
-@pytest.mark.parametrize(
-    ('section', 'value'),
-    [
+def test_what_another_key_configures_is_not_written_twice(tmp_path: Path) -> None:
+    """Constants are compared, heartbeat and PDOs written by their own rules."""
+    for section, value in (
         ('2000', '0x7'),  # the default
         ('1000', '1'),  # const
         ('1018sub1', '1'),  # identity
         ('1017', '250'),  # heartbeat
         ('1800sub2', '1'),
         ('1A00sub1', '0x60410010'),
-    ],
-)
-def test_what_another_key_configures_is_not_written_twice(
-    tmp_path: Path, section: str, value: str
-) -> None:
-    """Constants are compared, heartbeat and PDOs written by their own rules."""
-    config = load(tmp_path, {section: value})
-    assert written(config) == written(load(tmp_path, {})) == {}
-    heartbeat = config.nodes[0].heartbeat_producer
-    assert heartbeat == pytest.approx(0.25 if section == '1017' else 0.0)
+    ):
+        config = load(tmp_path, {section: value})
+        assert written(config) == written(load(tmp_path, {})) == {}, section
+        heartbeat = config.nodes[0].heartbeat_producer
+        assert heartbeat == pytest.approx(0.25 if section == '1017' else 0.0), section
 
 
 def test_commands_are_not_written_and_that_is_said(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 import pytest
 from tool_environment import BUS, DRIVE_OBJECTS
 
-from arm_canopen import BusConfig
 from canopen_core.can import Frame
 from canopen_core.standard import ConsumerHeartbeatTime, sdo
 from canopen_tools import Description, FrameDescriber
@@ -82,22 +81,19 @@ OTHERS = [
 """Requests say what is wanted, error frames what happened."""
 
 
-@pytest.mark.parametrize(
-    ('config', 'frame', 'text'),
-    [
+def test_every_service_has_words() -> None:
+    """By the pre-defined connection set; devices, objects and COB-IDs by bus.yml and EDS."""
+    for config, frame, text in (
         *((None, Frame(can_id, bytes.fromhex(data)), text) for can_id, data, text in GENERIC),
         *((BUS, Frame(can_id, bytes.fromhex(data)), text) for can_id, data, text in NAMED),
         *((BUS, frame, text) for frame, text in OTHERS),
-    ],
-)
-def test_every_service_has_words(config: BusConfig | None, frame: Frame, text: str) -> None:
-    """By the pre-defined connection set; devices, objects and COB-IDs by bus.yml and EDS."""
-    assert str(FrameDescriber(config).describe(frame)) == text
+    ):
+        assert str(FrameDescriber(config).describe(frame)) == text
 
 
-@pytest.mark.parametrize(
-    ('can_id', 'data', 'kind', 'is_alert'),
-    [
+def test_kinds_and_alerts() -> None:
+    """Each frame has its service, and what is wrong is marked."""
+    for can_id, data, kind, is_alert in (
         (0x082, '3023010000000000', FrameKind.EMCY, True),
         (0x082, '0000000000000000', FrameKind.EMCY, False),
         (0x182, '371601', FrameKind.PDO, False),
@@ -108,12 +104,9 @@ def test_every_service_has_words(config: BusConfig | None, frame: Frame, text: s
         (0x000, '05', FrameKind.NMT, True),
         (0x100, '', FrameKind.TIME, False),
         (0x7FF, '04', FrameKind.OTHER, False),
-    ],
-)
-def test_kinds_and_alerts(can_id: int, data: str, kind: FrameKind, is_alert: bool) -> None:
-    """Each frame has its service, and what is wrong is marked."""
-    said = FrameDescriber(BUS).describe(Frame(can_id, bytes.fromhex(data)))
-    assert (said.kind, said.is_alert) == (kind, is_alert)
+    ):
+        said = FrameDescriber(BUS).describe(Frame(can_id, bytes.fromhex(data)))
+        assert (said.kind, said.is_alert) == (kind, is_alert), (can_id, data)
 
 
 sdo_frames = st.builds(Frame, st.sampled_from([0x602, 0x582]), st.binary(min_size=8, max_size=8))
@@ -146,9 +139,9 @@ FRAMES = {
 }
 
 
-@pytest.mark.parametrize(
-    ('terms', 'shown'),
-    [
+def test_terms_choose_frames() -> None:
+    """Positive terms add up, negative ones take away, none shows all."""
+    for terms, shown in (
         ([], set(FRAMES)),
         ([''], set(FRAMES)),
         (['sdo'], {'sdo'}),
@@ -164,15 +157,14 @@ FRAMES = {
         (['700:780'], {'heartbeat', 'other heartbeat'}),
         (['182:7FF'], {'tpdo', 'extended'}),
         (['10182'], {'extended'}),
-    ],
-)
-def test_terms_choose_frames(terms: list[str], shown: set[str]) -> None:
-    """Positive terms add up, negative ones take away, none shows all."""
-    describer, chosen = FrameDescriber(BUS), FrameFilter(terms)
-    seen = {
-        name for name, frame in FRAMES.items() if chosen.shows(frame, describer.describe(frame))
-    }
-    assert seen == shown
+    ):
+        describer, chosen = FrameDescriber(BUS), FrameFilter(terms)
+        seen = {
+            name
+            for name, frame in FRAMES.items()
+            if chosen.shows(frame, describer.describe(frame))
+        }
+        assert seen == shown, terms
 
 
 @pytest.mark.parametrize('term', ['tpdos', '18x', '180:', ':7FF', '^', '^foo', '123456789'])
@@ -192,20 +184,17 @@ def lines(style: TimeStyle, *stamps: float) -> list[str]:
     return [formatted.line(Frame(0x181, b'\x27\x06', stamp), SAID) for stamp in stamps]
 
 
-@pytest.mark.parametrize(
-    ('style', 'times'),
-    [
+def test_time_styles() -> None:
+    """Times are absolute, since the first line, since the line before, or left out."""
+    for style, times in (
         (TimeStyle.ABSOLUTE, ['(1700000010.500000) ', '(1700000012.000000) ']),
         (TimeStyle.ZERO, ['(0000.000000) ', '(0001.500000) ']),
         (TimeStyle.DELTA, ['(0000.000000) ', '(0001.250000) ']),
         (TimeStyle.NONE, ['', '']),
-    ],
-)
-def test_time_styles(style: TimeStyle, times: list[str]) -> None:
-    """Times are absolute, since the first line, since the line before, or left out."""
-    first, _, last = lines(style, 10.5, 10.75, 12.0)
-    rest = '     181  [2]  27 06                    TPDO1      joint1     Status=0'
-    assert [first, last] == [time + rest for time in times]
+    ):
+        first, _, last = lines(style, 10.5, 10.75, 12.0)
+        rest = '     181  [2]  27 06                    TPDO1      joint1     Status=0'
+        assert [first, last] == [time + rest for time in times], style
 
 
 def test_the_columns_stay_where_they_are() -> None:
@@ -232,9 +221,9 @@ def test_colors_paint_the_meaning_and_alerts_are_red() -> None:
     assert '\x1b[36mTPDO1' in colored.line(frame, SAID)
 
 
-@pytest.mark.parametrize(
-    ('line', 'own', 'parameters'),
-    [
+def test_ros_arguments_are_taken_out() -> None:
+    """What is for ROS ends at `--` or at the end; the rest is the program's own."""
+    for line, own, parameters in (
         ('', '', {}),
         ('vcan0 -n 3', 'vcan0 -n 3', {}),
         ('vcan0 --ros-args', 'vcan0', {}),
@@ -246,11 +235,8 @@ def test_colors_paint_the_meaning_and_alerts_are_red() -> None:
         ('--ros-args --disable-stdout-logs -p a:=1', '', {'a': '1'}),
         ('-n 3 --ros-args -p a:=1 -- -t a --ros-args -p b:=2', '-n 3 -t a', {'a': '1', 'b': '2'}),
         ('-p 3', '-p 3', {}),
-    ],
-)
-def test_ros_arguments_are_taken_out(line: str, own: str, parameters: dict[str, str]) -> None:
-    """What is for ROS ends at `--` or at the end; the rest is the program's own."""
-    assert split_ros_arguments(line.split()) == (own.split(), parameters)
+    ):
+        assert split_ros_arguments(line.split()) == (own.split(), parameters), line
 
 
 @pytest.mark.parametrize('line', ['--ros-args -p', '--ros-args -p a', '--ros-args -p :=1'])

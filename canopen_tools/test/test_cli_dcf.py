@@ -10,7 +10,6 @@ from typing import Any
 import canopen
 from config_samples import load_text, write_bus
 from eds_samples import eds_text
-import pytest
 from tool_environment import Output, REPOSITORY
 
 from arm_canopen import BusConfig, load_bus
@@ -136,9 +135,12 @@ EQUAL = {'1017:00=0000', '1029:01=00', '1400:02=FF', '1801:03=0000'}
 """What is as the EDS has it."""
 
 
-@pytest.mark.parametrize(
-    ('old', 'new', 'present', 'absent'),
-    [
+def test_only_what_differs_from_the_eds_is_written(tmp_path: Path) -> None:
+    """As dcfgen does; the identifier is switched off and on around every change.
+
+    All on request: a device that stores other values needs those that are equal, too.
+    """
+    for old, new, present, absent in (
         ('heartbeat_producer: 1000', 'heartbeat_producer: 0', '', '1017:00=0000'),
         ('error_behavior: {1: 2}', 'error_behavior: {1: 0}', '', '1029:01=00'),
         ('heartbeat_consumer: true', 'heartbeat_consumer: false', '', '1016:01=2C010100'),
@@ -149,46 +151,33 @@ EQUAL = {'1017:00=0000', '1029:01=00', '1400:02=FF', '1801:03=0000'}
         ('transmission: 1', 'event_deadline: 30', '1400:05=1E00', '1400:02=01'),
         ('cob_id: auto', 'cob_id: 0x6A0', '1801:01=A0060080 1801:01=A0060000', '1801:02=01'),
         ('    2:\n      enabled: false', f'    2:\n      {SECOND}', '1401:02=03', '1401:02=FF'),
-    ],
-)
-def test_only_what_differs_from_the_eds_is_written(
-    tmp_path: Path, old: str, new: str, *, present: str, absent: str
-) -> None:
-    """As dcfgen does; the identifier is switched off and on around every change.
-
-    All on request: a device that stores other values needs those that are equal, too.
-    """
-    text = edited(old, new)
-    writes = set(writes_of(tmp_path, text))
-    assert set(present.split()) <= writes
-    assert absent not in writes
-    complete = set(writes_of(tmp_path, text, complete=True))
-    assert writes < complete
-    assert (absent in complete) is (absent in EQUAL)
+    ):
+        text = edited(old, new)
+        writes = set(writes_of(tmp_path, text))
+        assert set(present.split()) <= writes, old
+        assert absent not in writes, old
+        complete = set(writes_of(tmp_path, text, complete=True))
+        assert writes < complete, old
+        assert (absent in complete) is (absent in EQUAL), old
 
 
-@pytest.mark.parametrize(
-    ('wanted', 'entry', 'first'),
-    [
+def test_an_entry_of_the_eds_is_the_masters_or_left_alone(tmp_path: Path) -> None:
+    """Cleared where the device shall not watch the master; one of somebody else stays."""
+    for wanted, entry, first in (
         ('false', '0x00010000', SdoWrite(0x1016, 1, bytes(4))),
         ('false', '0x00010064', SdoWrite(0x1016, 1, bytes(4))),
         ('true', '0x00090000', SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')),
         ('true', '0x00090064', None),
-    ],
-)
-def test_an_entry_of_the_eds_is_the_masters_or_left_alone(
-    tmp_path: Path, wanted: str, entry: str, first: SdoWrite | None
-) -> None:
-    """Cleared where the device shall not watch the master; one of somebody else stays."""
-    eds = eds_text().splitlines()
-    place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
-    eds[place] = f'DefaultValue={entry}'
-    text = edited('heartbeat_consumer: true', f'heartbeat_consumer: {wanted}')
-    config = load_text(tmp_path, text, eds='\n'.join(eds))
-    watching = [w for w in device_writes(config, config.nodes[0]) if w.index == 0x1016]
-    assert watching == ([] if first is None else [first])
-    compared = {item.index for item in expected_objects(config, config.nodes[0])}
-    assert (0x1016 in compared) is (first is not None)
+    ):
+        eds = eds_text().splitlines()
+        place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
+        eds[place] = f'DefaultValue={entry}'
+        text = edited('heartbeat_consumer: true', f'heartbeat_consumer: {wanted}')
+        config = load_text(tmp_path, text, eds='\n'.join(eds))
+        watching = [w for w in device_writes(config, config.nodes[0]) if w.index == 0x1016]
+        assert watching == ([] if first is None else [first]), wanted
+        compared = {item.index for item in expected_objects(config, config.nodes[0])}
+        assert (0x1016 in compared) is (first is not None), wanted
 
 
 def test_expected_numbers_are_in_the_file_of_the_master(tmp_path: Path) -> None:

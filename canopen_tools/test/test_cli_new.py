@@ -164,9 +164,9 @@ FACTOR = (
 )
 
 
-@pytest.mark.parametrize(
-    ('rows', 'options', 'velocity', 'words'),
-    [
+def test_velocity_is_in_the_unit_that_the_eds_names(tmp_path: Path) -> None:
+    """In 0x60A9, with the reason behind the scale."""
+    for rows, options, velocity, words in (
         ([RPM, RPM_PER_S], ['--turn', 'arm=-1000', '--rpm', 'arm=1'], -60 / TURN, '1 turns/min'),
         ([TENTHS], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 600 / TURN, '0.1 turns/min by'),
         ([RPM], ['--metre', 'arm=5000', '--rpm', 'arm=20'], 20 * 60, ', 20 turns for 1 m'),
@@ -177,23 +177,20 @@ FACTOR = (
         ([], ['--rpm', 'arm=100'], 60 * 100 / TURN, '# rpm, 100 turns for '),
         # 0x6096 alone; torque turns with the position
         (FACTOR, ['--turn', 'arm=-4096', '--mode', 'arm=1'], -60 / TURN, 'by 0x6096 of the EDS'),
-    ],
-)
-def test_velocity_is_in_the_unit_that_the_eds_names(
-    *, rows: Sequence[Row], options: Sequence[str], velocity: float, words: str, tmp_path: Path
-) -> None:
-    """In 0x60A9, with the reason behind the scale."""
-    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, *rows]), tmp_path / 'bus.yml'
-    assert main(['new', f'arm={eds}@5', *options, '--output', str(bus_yml)]) == 0
-    (node,) = load_bus(bus_yml).nodes
-    assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
-    assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
-    assert node.drive.scale_eff_to_dev == math.copysign(1.0, node.drive.scale_pos_to_dev)
-    (line,) = re.findall('scale_vel_to_dev.*', bus_yml.read_text())
-    assert words in line
-    if RPM_PER_S in rows:  # 0.1 rpm/s beside rpm: ten times the scale of velocities
-        assert node.drive.scale_acc_to_dev == pytest.approx(-600 / TURN)
-        assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text()
+    ):
+        eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, *rows]), tmp_path / 'bus.yml'
+        assert main(['new', f'arm={eds}@5', *options, '--output', str(bus_yml), '--force']) == 0
+        (node,) = load_bus(bus_yml).nodes
+        assert node.drive.scale_vel_to_dev == pytest.approx(velocity), options
+        assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity), options
+        assert node.drive.scale_eff_to_dev == math.copysign(1.0, node.drive.scale_pos_to_dev), (
+            options
+        )
+        (line,) = re.findall('scale_vel_to_dev.*', bus_yml.read_text())
+        assert words in line, options
+        if RPM_PER_S in rows:  # 0.1 rpm/s beside rpm: ten times the scale of velocities
+            assert node.drive.scale_acc_to_dev == pytest.approx(-600 / TURN), options
+            assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text(), options
 
 
 @pytest.mark.usefixtures('folder')
