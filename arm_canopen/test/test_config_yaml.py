@@ -149,9 +149,9 @@ def test_a_key_counts_or_is_said_to_be_ignored(tmp_path: Path, section: str, key
     assert (changed == bus_of(tmp_path, key, section)) == (key.use is Use.IGNORED)
 
 
-@pytest.mark.parametrize(
-    ('key', 'texts', 'value'),
-    [
+def test_notations(tmp_path: Path) -> None:
+    """All notations without doubt are taken."""
+    for key, texts, value in (
         ('node_id', '0x10 16 "16" \'0x10\' 0b10000 1_6 +16 16.0 1.6e1', 16),
         ('node_id', '1e1', 10),
         ('node_id', '007', 7),
@@ -162,13 +162,10 @@ def test_a_key_counts_or_is_said_to_be_ignored(tmp_path: Path, section: str, key
         ('drive.offset_pos_to_dev', '0x10', 16.0),
         ('mandatory', 'true yes on True 1 Y', True),  # as dcfgen takes them
         ('mandatory', 'false no off False 0 N', False),
-    ],
-)
-def test_notations(tmp_path: Path, key: str, texts: str, value: object) -> None:
-    """All notations without doubt are taken."""
-    for text in texts.split():
-        bus = load_text(tmp_path, added('joint1', f'{key.removeprefix("drive.")}: {text}'))
-        assert attrgetter(key)(bus.nodes[0]) == value, text
+    ):
+        for text in texts.split():
+            bus = load_text(tmp_path, added('joint1', f'{key.removeprefix("drive.")}: {text}'))
+            assert attrgetter(key)(bus.nodes[0]) == value, text
 
 
 def test_a_device_may_be_called_on(tmp_path: Path) -> None:
@@ -218,9 +215,9 @@ def test_a_mistake_in_a_template_is_reported_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ('text', 'line', 'message'),
-    [
+def test_what_is_no_good_yaml(tmp_path: Path) -> None:
+    """Syntax, duplicate keys, recursion and tags are reported with their line, not a traceback."""
+    for text, line, message in (
         ('', 0, 'the file is empty'),
         ('# nothing\n', 0, 'the file is empty'),
         ('- a\n- b\n', 0, 'the top level is not a mapping'),
@@ -239,16 +236,12 @@ def test_a_mistake_in_a_template_is_reported_once(tmp_path: Path) -> None:
         (added('joint1', '<<: 5'), 23, "'<<' takes a mapping"),
         (added('joint1', 'node_id: !secret 2'), 22, "the tag '!secret' has no meaning"),
         (added('joint1', 'node_id: !!python/object:os.system 2'), 22, 'python/object'),
-    ],
-    ids=lambda value: str(value)[-20:],
-)
-def test_what_is_no_good_yaml(tmp_path: Path, text: str, line: int, message: str) -> None:
-    """Syntax, duplicate keys, recursion and tags are reported with their line, not a traceback."""
-    path = tmp_path / 'bus.yml'
-    write_bus(tmp_path).write_text(text, encoding='utf-8')
-    with pytest.raises(ConfigError, match=message) as caught:
-        load_bus(path)
-    assert line in [problem.line for problem in caught.value.problems]
+    ):
+        path = tmp_path / 'bus.yml'
+        write_bus(tmp_path).write_text(text, encoding='utf-8')
+        with pytest.raises(ConfigError, match=message) as caught:
+            load_bus(path)
+        assert line in [problem.line for problem in caught.value.problems], text
 
 
 def test_many_aliases_do_not_explode(tmp_path: Path) -> None:

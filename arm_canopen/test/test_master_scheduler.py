@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -117,28 +116,24 @@ def test_the_next_deadline_is_the_earliest_timer(delays: list[float], jumps: lis
         assert scheduler.next_deadline() == (min(waiting) if waiting else None)
 
 
-@pytest.mark.parametrize(
-    ('steps', 'expected'),
-    [
+def test_waiting_ends_once() -> None:
+    """With the result, with its error or with the time-out, whichever is first."""
+    for steps, expected in (
         ([('resolve', 7)], 7),
         ([('reject', SdoError('x'))], SdoError),
         ([('advance', 1.0)], TimeoutError),
         ([('advance', 0.999), ('resolve', 7)], 7),
         ([('advance', 1.0), ('resolve', 7)], TimeoutError),
-    ],
-    ids=['result', 'error', 'time-out', 'just in time', 'too late'],
-)
-def test_waiting_ends_once(steps: list[tuple[str, Any]], expected: object) -> None:
-    """With the result, with its error or with the time-out, whichever is first."""
-    scheduler = Scheduler()
-    promise: Promise[int] = Promise()
-    task = scheduler.spawn(scheduler.wait(promise, 1.0))
-    assert scheduler.next_deadline() == 1.0
-    for name, value in steps:
-        getattr(scheduler if name == 'advance' else promise, name)(value)
-    assert scheduler.next_deadline() is None
-    scheduler.advance(5.0)
-    assert (type(task.error) if task.error else task.result()) == expected
+    ):
+        scheduler = Scheduler()
+        promise: Promise[int] = Promise()
+        task = scheduler.spawn(scheduler.wait(promise, 1.0))
+        assert scheduler.next_deadline() == 1.0, steps
+        for name, value in steps:
+            getattr(scheduler if name == 'advance' else promise, name)(value)
+        assert scheduler.next_deadline() is None, steps
+        scheduler.advance(5.0)
+        assert (type(task.error) if task.error else task.result()) == expected, steps
 
 
 def test_until_looks_whenever_time_advances() -> None:

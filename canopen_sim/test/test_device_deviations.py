@@ -411,7 +411,7 @@ def test_nothing_moves_by_itself_afterwards(end: str, mode: int) -> None:
     rig = moving(mode)
     rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     rig.run(0.1)
-    assert rig.state is DriveState.OPERATION_ENABLED
+    assert rig.state == DriveState.OPERATION_ENABLED.value
     assert rig.velocity == pytest.approx(500, abs=5)
     if end == 'fault':
         rig.drive.raise_fault(0x4310, rig.now)

@@ -108,9 +108,9 @@ FAR = 'and by the factor group of the EDS only 0.00999 rad'
 SPEEDS = r'0x6081 speed of moves .*0x6083 acceleration .*\njoint1 +0.015 +0.5 +0.5 +0.5\n'
 
 
-@pytest.mark.parametrize(
-    ('rows', 'keys', 'shown', 'not_shown'),
-    [
+def test_units_and_speeds_of_each_axis(tmp_path: Path, capsys: Output) -> None:
+    """What 1.0 is in increments and in [rad], by which objects, and how fast its own moves are."""
+    for rows, keys, shown, not_shown in (
         (WITH_FACTORS, '', [r'joint1 +1000 +0.01 +1000', EXPLAINED], UNKNOWN),
         (WITH_FACTORS, BY_FACTORS, [r'group of the EDS \(0x608F, 0x6092\)'], EXPLAINED),
         (ENCODER_ONLY, BY_FACTORS, [r'group of the EDS \(0x608F\)'], UNKNOWN),
@@ -118,18 +118,12 @@ SPEEDS = r'0x6081 speed of moves .*0x6083 acceleration .*\njoint1 +0.015 +0.5 +0
         (DRIVE_ROWS, SLOW, [SPEEDS], '0x607F'),
         (WITH_FACTORS, SCALES.format(1e4, 1e-4), ['joint1 +10000 +0.1 '], 'one of them is wrong'),
         (WITH_FACTORS, SCALES.format(999.0, 1 / 999), [r'joint1 +999 +0.00999 ', FAR], UNKNOWN),
-    ],
-)
-def test_units_and_speeds_of_each_axis(
-    rows: Sequence[Row], keys: str, *, shown: list[str], not_shown: str, tmp_path: Path,
-    capsys: Output,
-) -> None:  # fmt: skip
-    """What 1.0 is in increments and in [rad], by which objects, and how fast its own moves are."""
-    text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {keys}\n')
-    main(['check', str(write_bus(tmp_path, text, eds=eds_text(rows)))])
-    output = capsys.readouterr().out
-    assert [pattern for pattern in shown if not re.search(pattern, output)] == []
-    assert not_shown not in output
+    ):
+        text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {keys}\n')
+        main(['check', str(write_bus(tmp_path, text, eds=eds_text(rows)))])
+        output = capsys.readouterr().out
+        assert [pattern for pattern in shown if not re.search(pattern, output)] == [], keys
+        assert not_shown not in output, keys
 
 
 def test_wrong_usage_is_2(capsys: Output) -> None:
