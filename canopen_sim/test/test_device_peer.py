@@ -16,7 +16,6 @@ import threading
 import time
 from typing import Any
 
-import can
 from can_addresses import free_virtual
 import canopen
 from canopen.profiles.p402 import BaseNode402
@@ -25,7 +24,7 @@ from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
 
 from arm_canopen import CanopenMaster, DriveError
-from canopen_core.can import Frame, open_bus
+from canopen_core.can import open_bus
 from canopen_core.can.plugin import ArmCanopenBus
 from canopen_core.eds import load_eds
 from canopen_core.standard import NmtCommand
@@ -113,53 +112,6 @@ MAPPING: dict[str, dict[int, list[tuple[int, int]]]] = {
 """The PDOs of the article's bus.yml."""
 
 
-class Wire:
-    """python-can's side of a bus that ends in a device in virtual time."""
-
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
-        self.network = make_network()
-        self.network.bus = self
-        self._delivered = 0
-
-    def send(self, message: can.Message, timeout: float | None = None) -> None:
-        """Deliver a frame of python-canopen."""
-        del timeout
-        frame = Frame(
-            message.arbitration_id, bytes(message.data), is_remote=message.is_remote_frame
-        )
-        self.rig.device.receive(frame, self.rig.now)
-        self.deliver()
-
-    def deliver(self) -> None:
-        """Deliver the frames of the device to python-canopen."""
-        while self._delivered < len(self.rig.sent):
-            moment, frame = self.rig.sent[self._delivered]
-            self._delivered += 1
-            self.network.notify(frame.can_id, bytearray(frame.data), moment)
-
-    def run(self, duration: float) -> None:
-        """Advance the time."""
-        self.rig.run(duration)
-        self.deliver()
-
-
-@pytest.fixture
-def wire() -> Wire:
-    """A device that was just switched on, and a network that received nothing of it."""
-    rig = Rig()
-    rig.sent.clear()
-    return Wire(rig)
-
-
-@pytest.fixture
-def node(wire: Wire) -> Any:  # python-canopen has no types
-    """python-canopen's view of the device, from the same EDS."""
-    node = canopen.RemoteNode(NODE_ID, str(EDS))
-    wire.network.add_node(node)
-    return node
-
-
 def configure(node: Any) -> None:
     """Write the article's PDOs the way python-canopen does."""
     node.pdo.read()
@@ -174,8 +126,11 @@ def configure(node: Any) -> None:
 
 
 @pytest.mark.slow
-def test_every_object_reads_as_the_eds_says(wire: Wire, node: Any) -> None:
-    """All values that the EDS gives arrive, decoded by python-canopen's own dictionary."""
+def test_every_object_reads_as_the_eds_says(node: Any) -> None:
+    """All values that the EDS gives arrive, decoded by python-canopen's own dictionary.
+
+    A string is read and a number written by the block protocol, too, CRC included.
+    """
     for entry in drive_dictionary().for_node(NODE_ID):
         if entry.default is None or (entry.index == 0x1003 and entry.subindex):
             continue
@@ -184,11 +139,6 @@ def test_every_object_reads_as_the_eds_says(wire: Wire, node: Any) -> None:
         variable = node.object_dictionary.get_variable(entry.index, entry.subindex)
         value = variable.decode_raw(node.sdo.upload(entry.index, entry.subindex))
         assert value == entry.default, str(entry)
-
-
-@pytest.mark.slow
-def test_block_transfers_of_python_canopen(node: Any) -> None:
-    """python-canopen reads a string and writes a number by the block protocol, CRC included."""
     with node.sdo.open(0x1008, 0, 'rb', block_transfer=True) as stream:
         assert stream.read() == b'Simulated CiA 402 drive'
     with node.sdo.open(0x6081, 0, 'wb', block_transfer=True, size=4) as stream:
@@ -215,7 +165,7 @@ def syncs(network: Any) -> Iterator[None]:
 
 
 @pytest.fixture
-def drive() -> Iterator[Any]:
+def node() -> Iterator[Any]:
     """python-canopen's CiA 402 node, with the drive in threads on a bus in this process."""
     name = free_virtual()
     with open_bus(name) as bus:
@@ -226,18 +176,24 @@ def drive() -> Iterator[Any]:
         network.NOTIFIER_CYCLE = 0.02
         network.bus = ArmCanopenBus(name)
         network.connect()
-        node: Any = make_node(NODE_ID, str(EDS))
+        node = make_node(NODE_ID, str(EDS))
         network.add_node(node)
         node.sdo.RESPONSE_TIMEOUT = ARRIVAL
         try:
-            configure(node)
-            node.nmt.state = 'OPERATIONAL'
-            with syncs(network):
-                node.setup_402_state_machine()
-                yield node
+            yield node
         finally:
             network.disconnect()
             runner.stop()
+
+
+@pytest.fixture
+def drive(node: Any) -> Iterator[Any]:
+    """The node with the article's PDOs, in Operational."""
+    configure(node)
+    node.nmt.state = 'OPERATIONAL'
+    with syncs(node.network):
+        node.setup_402_state_machine()
+        yield node
 
 
 def wait(condition: Any) -> None:
