@@ -10,9 +10,7 @@ after a reset and sends no PDOs by itself, hence the test goes as far as it does
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-import threading
 import time
 from typing import Any
 
@@ -146,24 +144,6 @@ def test_every_object_reads_as_the_eds_says(node: Any) -> None:
     assert node.sdo.upload(0x6081, 0) == b'\x10\x27\x00\x00'
 
 
-@contextmanager
-def syncs(network: Any) -> Iterator[None]:
-    """Send SYNC from a thread; python-canopen's own needs a bus of the kernel."""
-    stop = threading.Event()
-
-    def run() -> None:
-        while not stop.wait(SYNC_PERIOD):
-            network.sync.transmit()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
-
-
 @pytest.fixture
 def node() -> Iterator[Any]:
     """python-canopen's CiA 402 node, with the drive in threads on a bus in this process."""
@@ -191,9 +171,10 @@ def drive(node: Any) -> Iterator[Any]:
     """The node with the article's PDOs, in Operational."""
     configure(node)
     node.nmt.state = 'OPERATIONAL'
-    with syncs(node.network):
-        node.setup_402_state_machine()
-        yield node
+    node.network.sync.start(SYNC_PERIOD)
+    node.setup_402_state_machine()
+    yield node
+    node.network.sync.stop()
 
 
 def wait(condition: Any) -> None:
