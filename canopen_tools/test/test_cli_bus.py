@@ -12,6 +12,7 @@ import threading
 import time
 from typing import Any, NamedTuple
 
+import can
 from can_addresses import free_virtual
 from config_samples import ARTICLE_BUS
 from device_rig import EDS
@@ -19,7 +20,8 @@ import pytest
 from tool_environment import Output
 
 from arm_canopen import CanopenMaster, Event, EventKind, Severity
-from canopen_core.can import Bus, Frame, open_bus
+from canopen_core.can import Bus, open_bus
+from canopen_core.can.plugin import ArmCanopenBus
 from canopen_core.eds import load_eds
 from canopen_sim import DeviceRunner, Fault, FaultInjection, simulated_devices
 from canopen_tools.cli.main import main
@@ -88,19 +90,10 @@ def bus_yml(tmp_path: Path) -> str:
 
 @pytest.fixture
 def master(name: str) -> Iterator[None]:
-    """Somebody who sends SYNC, as a master does."""
-    stop = threading.Event()
-
-    def sync(bus: Bus) -> None:
-        while not stop.wait(0.01):
-            bus.send(Frame(0x080))
-
-    with open_bus(name) as bus:
-        thread = threading.Thread(target=sync, args=(bus,))
-        thread.start()
+    """SYNC, as a master sends it."""
+    with ArmCanopenBus(name) as bus:
+        bus.send_periodic(can.Message(arbitration_id=0x080, is_extended_id=False), 0.01)
         yield
-        stop.set()
-        thread.join()
 
 
 @pytest.fixture

@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import os
 from pathlib import Path
 from typing import TypeAlias
 
+from drive_samples import bus_config, drive_config, pdo
 import pytest
 
-from arm_canopen import BusConfig, NodeConfig
-from arm_canopen.config import MasterConfig, PdoConfig, RPDO, TPDO
+from arm_canopen import NodeConfig
 from canopen_core.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
 
 REPOSITORY = Path(__file__).parents[2]
@@ -50,27 +51,17 @@ DRIVE_OBJECTS = ObjectDictionary(
 )
 
 
-def _mapped(*objects: tuple[int, DataType]) -> tuple[MappedObject, ...]:
-    return tuple(MappedObject(index, 0, data_type) for index, data_type in objects)
-
-
-def _pdo(number: int, cob_id: int, *objects: tuple[int, DataType]) -> PdoConfig:
-    direction = TPDO if cob_id & 0x80 else RPDO
-    return PdoConfig(direction, number, True, cob_id, 1, mapping=_mapped(*objects))
-
-
-DRIVE = NodeConfig(
-    name='joint1',
-    node_id=2,
-    driver='ros2_canopen::Cia402Driver',
-    eds=Path('drive.eds'),
+UNKNOWN = MappedObject(0x5FFF, 0, DataType.UNSIGNED8)
+DRIVE = drive_config(
+    'joint1',
+    2,
     dictionary=DRIVE_OBJECTS,
     tpdos=(
-        _pdo(1, 0x182, (0x6041, DataType.UNSIGNED16), (0x6061, DataType.INTEGER8)),
-        _pdo(2, 0x2A5, (0x6064, DataType.INTEGER32), (0x5FFF, DataType.UNSIGNED8)),
-        PdoConfig(TPDO, 3, enabled=False, cob_id=0x382, transmission=1),
+        pdo(1, 0x182, (0x6041, 0), (0x6061, 0)),
+        replace(position := pdo(2, 0x2A5, (0x6064, 0)), mapping=(*position.mapping, UNKNOWN)),
+        replace(pdo(3, 0x382), enabled=False),
     ),
-    rpdos=(_pdo(1, 0x202, (0x6040, DataType.UNSIGNED16), (0x6060, DataType.INTEGER8)),),
+    rpdos=(pdo(1, 0x202, (0x6040, 0), (0x6060, 0)),),
 )
 DEVICE = NodeConfig(
     name='gripper',
@@ -84,6 +75,4 @@ DEVICE = NodeConfig(
         ]
     ),
 )
-BUS = BusConfig(
-    file=Path('bus.yml'), master=MasterConfig(node_id=1, name='master'), nodes=(DRIVE, DEVICE)
-)
+BUS = bus_config(DRIVE, DEVICE)
