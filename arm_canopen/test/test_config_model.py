@@ -233,9 +233,13 @@ def test_lists_of_writes_merge_by_object(tmp_path: Path) -> None:
         assert writes == expected, own
 
 
-@pytest.mark.parametrize(
-    ('options', 'own', 'folder'),
-    [
+def test_where_the_eds_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In dcf_path (the device's, else that of the options), else beside the bus.yml, reported."""
+    for name in ('a', 'b'):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / 'drive.eds').write_text(eds_text(), encoding='utf-8')
+    monkeypatch.setenv('EDS_OF_TEST', str(tmp_path / 'b'))
+    for options, own, folder in (
         ('', 'dcf: drive.eds', '.'),
         ('options: {dcf_path: "@BUS_CONFIG_PATH@"}', 'dcf: drive.eds', '.'),
         ('options: {dcf_path: "@BUS_CONFIG_PATH@/a"}', 'dcf: drive.eds', 'a'),
@@ -246,28 +250,15 @@ def test_lists_of_writes_merge_by_object(tmp_path: Path) -> None:
         ('', 'dcf: ${EDS_OF_TEST}/drive.eds', 'b'),
         ('', 'dcf: "@BUS_CONFIG_PATH@/a/drive.eds"', 'a'),
         ('', 'eds: "@BUS_CONFIG_PATH@/a/drive.eds"', 'a'),
-    ],
-)
-def test_where_the_eds_is_looked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: str, own: str, folder: str
-) -> None:
-    """In dcf_path (the device's, else that of the options), else beside the bus.yml, reported."""
-    for name in ('a', 'b'):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / 'drive.eds').write_text(eds_text(), encoding='utf-8')
-    monkeypatch.setenv('EDS_OF_TEST', str(tmp_path / 'b'))
-    bus = load_text(tmp_path, f'{options}\n{added("joint1", own)}')
-    assert bus.nodes[0].eds.resolve() == (tmp_path / folder / 'drive.eds').resolve()
-    assert len([w for w in bus.warnings if 'taken is' in w.message]) == ('nowhere' in options)
-
-
-def test_another_folder_for_the_variable(tmp_path: Path) -> None:
-    """@BUS_CONFIG_PATH@ may be made to stand for another folder."""
-    other = tmp_path / 'other'
-    other.mkdir()
-    (other / 'drive.eds').write_text(eds_text(), encoding='utf-8')
+    ):
+        bus = load_text(tmp_path, f'{options}\n{added("joint1", own)}')
+        found = bus.nodes[0].eds.resolve()
+        assert found == (tmp_path / folder / 'drive.eds').resolve(), (options, own)
+        assert len([w for w in bus.warnings if 'taken is' in w.message]) == ('nowhere' in options)
+    # @BUS_CONFIG_PATH@ may be made to stand for another folder
     path = write_bus(tmp_path, f'options: {{dcf_path: "@BUS_CONFIG_PATH@"}}\n{BUS}')
-    assert load_bus(path, bus_config_path=other).nodes[0].eds == other / 'drive.eds'
+    (node,) = load_bus(path, bus_config_path=tmp_path / 'b').nodes
+    assert node.eds == tmp_path / 'b' / 'drive.eds'
 
 
 @pytest.fixture(params=['sample EDS', 'shipped EDS'])

@@ -141,43 +141,39 @@ class StoringRig(Rig):
 DEFAULTS = 10_000, 0
 
 
-@pytest.fixture
-def storing() -> StoringRig:
-    """A drive with another acceleration and heartbeat time than the EDS has."""
-    storing = StoringRig()
-    storing.put(0x6083, 4711)
-    storing.put(0x1017, 250)
-    return storing
+def storing_rig() -> StoringRig:
+    """Return a drive with another acceleration and heartbeat time than the EDS has."""
+    rig = StoringRig()
+    rig.put(0x6083, 4711)
+    rig.put(0x1017, 250)
+    return rig
 
 
-@pytest.mark.parametrize(
-    ('stored', 'reset', 'kept'),
-    [
-        ((), 'power', False),
-        ((0x1010,), 'power', True),
-        ((0x1010,), NmtCommand.RESET_NODE, True),
-        ((0x1010, 0x1011), 'power', False),
-    ],
-)
-def test_what_is_stored_is_kept(
-    storing: StoringRig, stored: tuple[int, ...], reset: object, kept: bool
-) -> None:
+def test_what_is_stored_is_kept() -> None:
     """It survives power cuts and resets until it is restored; 0x1010 shows the abilities."""
-    for index in stored:
-        for value in (0, 1, SAVE if index == 0x1011 else LOAD):  # not by mistake
-            assert storing.refused(index, value, 1) == AbortCode.DATA_TRANSFER
-        storing.order(index)
-    storing.put(0x6083, 1)
-    if isinstance(reset, NmtCommand):
-        storing.nmt(reset)
-    else:
-        storing.power_cycle()
-    assert storing.values == ((4711, 250) if kept else DEFAULTS)
-    assert storing.get(0x1010, 1) == 1
+    for orders, reset, kept in (
+        ((), None, False),
+        ((0x1010,), None, True),
+        ((0x1010,), NmtCommand.RESET_NODE, True),
+        ((0x1010, 0x1011), None, False),
+    ):
+        storing = storing_rig()
+        for index in orders:
+            for value in (0, 1, SAVE if index == 0x1011 else LOAD):  # not by mistake
+                assert storing.refused(index, value, 1) == AbortCode.DATA_TRANSFER
+            storing.order(index)
+        storing.put(0x6083, 1)
+        if reset is None:
+            storing.power_cycle()
+        else:
+            storing.nmt(reset)
+        assert storing.values == ((4711, 250) if kept else DEFAULTS), (orders, reset)
+        assert storing.get(0x1010, 1) == 1
 
 
-def test_groups(storing: StoringRig) -> None:
+def test_groups() -> None:
     """Communication and application parameters are stored and restored by themselves."""
+    storing = storing_rig()
     storing.order(0x1010, 3)
     storing.power_cycle()
     assert storing.values == (4711, DEFAULTS[1])
@@ -189,8 +185,9 @@ def test_groups(storing: StoringRig) -> None:
     assert storing.values == (DEFAULTS[0], 250)
 
 
-def test_commands_are_not_stored_and_pdos_are(storing: StoringRig) -> None:
+def test_commands_are_not_stored_and_pdos_are() -> None:
     """Controlword, mode and target are 0 after a power cut; a stored PDO is sent at once."""
+    storing = storing_rig()
     storing.put(0x1800, COB_ID_INVALID | 0x1FE, 1)
     storing.put(0x1800, 0x40000000 | 0x1FE, 1)
     storing.put(0x1800, 1, 2)
@@ -207,8 +204,9 @@ def test_commands_are_not_stored_and_pdos_are(storing: StoringRig) -> None:
     assert storing.get(0x6064) == 0
 
 
-def test_verify_configuration(storing: StoringRig) -> None:
+def test_verify_configuration() -> None:
     """0x1020 is stored with what it stands for, and erased when something else is stored."""
+    storing = storing_rig()
     storing.put(0x1020, 14_000, 1)
     storing.put(0x1020, 3_600_000, 2)
     storing.order(0x1010)
