@@ -18,27 +18,7 @@ from model_robots import chain, chain_texts, ready, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 
-from arm_model import (
-    Array,
-    AttachedBody,
-    Box,
-    Capsule,
-    Cells,
-    Clearances,
-    CollisionObject,
-    compiled_scene,
-    CompiledScene,
-    Cone,
-    Cylinder,
-    Mesh,
-    Plane,
-    PlanningScene,
-    Pose,
-    RobotModel,
-    rotation_of,
-    Shape,
-    Sphere,
-)
+import arm_model as am
 from arm_model.scene import clearances, compiled
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
@@ -47,31 +27,33 @@ ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 SEARCHED = 1e-4  # accuracy of a distance that was searched for from another begin in [m]
 
 
-def among_things() -> RobotModel:
+def among_things() -> am.RobotModel:
     """Return a chain between a table, an object, and one that it carries."""
-    model = RobotModel(*chain_texts('zyyp'))
-    place = Pose(np.eye(3), np.array([0.4, 0.0, 0.5]))
-    cup = CollisionObject('cup', Cylinder(0.04, 0.1), pose=place)
-    scene = model.scene.with_object(CollisionObject('table', Plane(offset=-0.1))).with_object(cup)
-    tool = AttachedBody(CollisionObject('tool', Cone(0.05, 0.2)), 'link_4')
-    model.use_scene(Clearances(scene.with_attached(tool)))
+    model = am.RobotModel(*chain_texts('zyyp'))
+    place = am.Pose(np.eye(3), np.array([0.4, 0.0, 0.5]))
+    cup = am.CollisionObject('cup', am.Cylinder(0.04, 0.1), pose=place)
+    scene = model.scene.with_object(
+        am.CollisionObject('table', am.Plane(offset=-0.1))
+    ).with_object(cup)
+    tool = am.AttachedBody(am.CollisionObject('tool', am.Cone(0.05, 0.2)), 'link_4')
+    model.use_scene(am.Clearances(scene.with_attached(tool)))
     return model
 
 
 @pytest.mark.parametrize('model', [*ARMS, among_things()], ids=lambda model: model.name)
 @pytest.mark.parametrize(('stride', 'at_once'), [(0.003, 100), (0.05, 0), (1.0, 0), (1.0, 100)])
 def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
-    model: RobotModel, stride: float, at_once: int, monkeypatch: pytest.MonkeyPatch
+    model: am.RobotModel, stride: float, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On random walks, for each pair at each step, also where spheres show what is far apart."""
     monkeypatch.setattr(clearances, 'AT_ONCE', at_once)
     rng = np.random.default_rng(5)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
     at, within = (lower + upper) / 2.0, 0.05
-    known = Clearances(model.scene)
+    known = am.Clearances(model.scene)
     for _ in range(150):
         at = np.clip(at + stride * rng.uniform(-1.0, 1.0, len(at)), lower, upper)
-        measured = Clearances(model.scene).least(at, math.inf)
+        measured = am.Clearances(model.scene).least(at, math.inf)
         bounds = known.least(at, within)
         assert (bounds <= measured + SEARCHED).all()
         near = measured < within
@@ -82,7 +64,7 @@ def test_threads_that_ask_one_model_do_not_disturb_each_other() -> None:
     """Each gets the answers that it gets from a model of its own, however they take turns."""
     shared, places = robot('panda'), np.random.default_rng(7).uniform(0.0, 1.0, (4, 300, 7))
 
-    def answers(model: RobotModel, at: Array) -> list[list[float]]:
+    def answers(model: am.RobotModel, at: am.Array) -> list[list[float]]:
         return [[near.distance for near in model.nearest(one, math.inf, 5)] for one in at]
 
     alone = [answers(robot('panda'), at) for at in places]
@@ -103,57 +85,57 @@ PADDING = 0.02  # of a link in [m]
 lengths = st.floats(0.02, 0.5)
 corners = st.lists(st.tuples(lengths, lengths, lengths), min_size=8, max_size=20)
 solids = st.one_of(
-    st.builds(Box, lengths, lengths, lengths),
-    st.builds(Sphere, lengths),
-    st.builds(Cylinder, lengths, lengths),
-    st.builds(Capsule, lengths, lengths),
-    st.builds(Cone, lengths, lengths),
-    st.builds(Plane, st.tuples(lengths, lengths, lengths), st.floats(-1.5, -0.5)),
-    st.integers(0, 99).map(lambda seed: Mesh(np.random.default_rng(seed).random((20, 3)))),
+    st.builds(am.Box, lengths, lengths, lengths),
+    st.builds(am.Sphere, lengths),
+    st.builds(am.Cylinder, lengths, lengths),
+    st.builds(am.Capsule, lengths, lengths),
+    st.builds(am.Cone, lengths, lengths),
+    st.builds(am.Plane, st.tuples(lengths, lengths, lengths), st.floats(-1.5, -0.5)),
+    st.integers(0, 99).map(lambda seed: am.Mesh(np.random.default_rng(seed).random((20, 3)))),
 )
 numbers = st.floats(-1.0, 1.0)
 poses = st.builds(
-    lambda turn, place: Pose(rotation_of(turn / np.linalg.norm(turn)), np.array(place)),
+    lambda turn, place: am.Pose(am.rotation_of(turn / np.linalg.norm(turn)), np.array(place)),
     st.tuples(numbers, numbers, numbers, st.just(1.0)),
     st.tuples(numbers, numbers, numbers),
 )
 
 
-def scene_with(shape: Shape, pose: Pose, name: str = 'panda') -> PlanningScene:
+def scene_with(shape: am.Shape, pose: am.Pose, name: str = 'panda') -> am.PlanningScene:
     """An arm beside an object, one of its links thicker than it is."""
     model = robot(name)
-    scene = model.scene.with_object(CollisionObject('thing', shape, pose=pose))
+    scene = model.scene.with_object(am.CollisionObject('thing', shape, pose=pose))
     link = list(model.scene.link_shapes)[-1]
     return scene.with_contents(padding={link: PADDING})
 
 
-def crowd(seed: int) -> PlanningScene:
+def crowd(seed: int) -> am.PlanningScene:
     """An arm among many things and a cloud of cells; one link may touch one thing."""
     draw = np.random.default_rng(seed)
-    shapes: list[Shape] = [Box(0.03, 0.05, 0.1), Sphere(0.03), Cylinder(0.02, 0.2)]
-    shapes += [Cone(0.05, 0.1), Mesh(0.1 * draw.random((20, 3)))]
-    cells = Cells(np.array(0.04 * (draw.integers(-30, 30, (50, 3)) + 0.5)), 0.04)
+    shapes: list[am.Shape] = [am.Box(0.03, 0.05, 0.1), am.Sphere(0.03), am.Cylinder(0.02, 0.2)]
+    shapes += [am.Cone(0.05, 0.1), am.Mesh(0.1 * draw.random((20, 3)))]
+    cells = am.Cells(np.array(0.04 * (draw.integers(-30, 30, (50, 3)) + 0.5)), 0.04)
     things = {}
     for number, turn in enumerate(draw.normal(size=(24, 4))):
-        place = Pose(rotation_of(turn / np.linalg.norm(turn)), draw.uniform(-1.2, 1.2, 3))
+        place = am.Pose(am.rotation_of(turn / np.linalg.norm(turn)), draw.uniform(-1.2, 1.2, 3))
         shape = shapes[number % len(shapes)]
-        things[f'thing{number}'] = CollisionObject(f'thing{number}', shape, pose=place)
-    tilted = Pose(rotation_of((0.1, 0.2, 0.3, 0.927)), draw.normal(0.0, 0.1, 3))
-    things['cells'] = CollisionObject('cells', cells, pose=tilted)
+        things[f'thing{number}'] = am.CollisionObject(f'thing{number}', shape, pose=place)
+    tilted = am.Pose(am.rotation_of((0.1, 0.2, 0.3, 0.927)), draw.normal(0.0, 0.1, 3))
+    things['cells'] = am.CollisionObject('cells', cells, pose=tilted)
     scene = robot('panda').scene.with_contents(objects=things)
     return scene.allowing(list(scene.link_shapes)[-1], 'thing0')
 
 
-def core(scene: PlanningScene) -> CompiledScene:
+def core(scene: am.PlanningScene) -> am.CompiledScene:
     """The compiled core of a scene; machines for tests have a compiler."""
-    found = compiled_scene(scene)
+    found = am.compiled_scene(scene)
     assert found is not None
     return found
 
 
 @given(shape=solids, pose=poses, seed=st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_distances_are_those_of_coal(shape: Shape, pose: Pose, seed: int) -> None:
+def test_distances_are_those_of_coal(shape: am.Shape, pose: am.Pose, seed: int) -> None:
     """Never above, hardly below; what overlaps there has no distance here."""
     agrees_with_coal(scene_with(shape, pose), seed)
 
@@ -165,11 +147,11 @@ def test_distances_in_a_crowd_are_those_of_coal(seed: int) -> None:
     agrees_with_coal(crowd(seed), seed)
 
 
-def agrees_with_coal(scene: PlanningScene, seed: int) -> None:
+def agrees_with_coal(scene: am.PlanningScene, seed: int) -> None:
     """Compare the distances at a random place."""
     limits = robot('panda').limits
     place = np.random.default_rng(seed).uniform(limits.lower, limits.upper)
-    results = Clearances(scene).measure(place, range(len(scene.pairs)))
+    results = am.Clearances(scene).measure(place, range(len(scene.pairs)))
     expected = np.array([results[pair].min_distance for pair in range(len(scene.pairs))])
     found, apart = core(scene).least(place, np.inf), expected > 0.0
     assert (found <= np.maximum(expected, 0.0) + ROUNDING).all()
@@ -187,10 +169,10 @@ def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
     if name == 'crowd':
         model, scene, edges, looks = robot('panda'), crowd(1), 20, 40
     else:
-        box, there = Box(0.2, 0.5, 0.5), Pose(np.eye(3), np.array([0.6, 0.0, 0.4]))
+        box, there = am.Box(0.2, 0.5, 0.5), am.Pose(np.eye(3), np.array([0.6, 0.0, 0.4]))
         model, scene, edges, looks = robot(name), scene_with(box, there, name), 60, 200
     draw = np.random.default_rng(1)
-    checked, reference = core(scene), Clearances(scene)
+    checked, reference = core(scene), am.Clearances(scene)
     required = np.full(len(scene.pairs), 1e-3)
     answers: list[bool] = []
     while len(answers) < edges:
@@ -214,11 +196,11 @@ def test_an_attached_octree_is_solid(link: str, *, moves: bool) -> None:
     """Also where it moves with its link: then coal measures, instead of the compiled core."""
     model, at = robot('panda'), ready('panda')
     elbow = model.scene.kinematics.link_pose('panda_link4', at)
-    scan = CollisionObject('scan', Cells(np.zeros((1, 3)), 0.1), pose=elbow)
+    scan = am.CollisionObject('scan', am.Cells(np.zeros((1, 3)), 0.1), pose=elbow)
     scene = model.scene.with_object(scan).attached('scan', link, at)
-    found = compiled_scene(scene)
+    found = am.compiled_scene(scene)
     assert (found is None) is moves
-    measured = found or Clearances(scene)
+    measured = found or am.Clearances(scene)
     assert measured.least(at, 1.0)[scene.pairs.index(('scan', 'panda_link4'))] <= 0.0
 
 
@@ -247,7 +229,7 @@ def test_without_the_core_there_is_one_warning(
     monkeypatch.setenv(setting, value)
     with caplog.at_level(logging.WARNING):
         for _ in range(2):
-            assert compiled_scene(robot('panda').scene) is None
+            assert am.compiled_scene(robot('panda').scene) is None
     assert len(caplog.records) == warned
 
 

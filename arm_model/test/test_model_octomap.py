@@ -22,23 +22,7 @@ from octomap_msgs.msg import OctomapWithPose
 import pytest
 from shape_msgs.msg import SolidPrimitive
 
-from arm_model import (
-    Array,
-    Box,
-    Capsule,
-    Cells,
-    Clearances,
-    Mesh,
-    OCTOMAP_NAME,
-    octomap_shapes,
-    PlacedShape,
-    SceneError,
-    Shape,
-    Sphere,
-)
-from arm_model import CollisionObject as Thing
-from arm_model import PlanningScene as Scene
-from arm_model import Pose as Placement
+import arm_model as am
 from arm_model.ros import apply_planning_scene, scene_change
 from arm_model.scene.octomap import _blocks
 
@@ -64,18 +48,18 @@ def stream(*, binary: bool) -> bytes:
 def test_cells_are_what_octomap_has_occupied(binary: bool) -> None:
     """Each leaf is in one cell, and cells hold no more than the leaves."""
     data, resolution = stream(binary=binary), written()['resolution']
-    found = cells_of(octomap_shapes('OcTree', data, resolution, binary=binary))
+    found = cells_of(am.octomap_shapes('OcTree', data, resolution, binary=binary))
     leaves = np.array(written()['leaves'])
     away = np.abs(leaves[:, None, :3] - found[:, :3]).max(axis=2)
     assert ((away < 0.5 * found[:, 3]).sum(axis=1) == 1).all()
     assert (found[:, 3] ** 3).sum() == pytest.approx((leaves[:, 3] ** 3).sum())
 
 
-def cells_of(shapes: Sequence[PlacedShape]) -> Array:
+def cells_of(shapes: Sequence[am.PlacedShape]) -> am.Array:
     """Return middle and edge of each cell (n, 4) in [m]."""
     rows = []
     for each in shapes:
-        assert isinstance(each.shape, Cells)
+        assert isinstance(each.shape, am.Cells)
         rows += [[*middle, each.shape.edge] for middle in each.shape.middles.tolist()]
     return np.array(rows, dtype=np.float64)
 
@@ -83,25 +67,29 @@ def cells_of(shapes: Sequence[PlacedShape]) -> Array:
 @settings(max_examples=30, deadline=None)
 @given(
     st.sets(st.tuples(*[st.integers(-3, 3)] * 3), min_size=1, max_size=40),
-    st.sampled_from([Box(0.1, 0.2, 0.1), Sphere(0.1), Capsule(0.05, 0.2), Mesh(CUBE)]),
+    st.sampled_from([am.Box(0.1, 0.2, 0.1), am.Sphere(0.1), am.Capsule(0.05, 0.2), am.Mesh(CUBE)]),
     st.tuples(*[st.integers(-8, 8)] * 3),
 )
-@example({(0, -2, -2), (1, -2, -2)}, Box(0.1, 0.2, 0.1), (3, -1, -2))
-@example({(-1, 1, 0), (0, -1, 0)}, Sphere(0.1), (0, 2, 2))
+@example({(0, -2, -2), (1, -2, -2)}, am.Box(0.1, 0.2, 0.1), (3, -1, -2))
+@example({(-1, 1, 0), (0, -1, 0)}, am.Sphere(0.1), (0, 2, 2))
 def test_cells_count_as_boxes(
-    cells: set[tuple[int, int, int]], shape: Shape, place: tuple[int, int, int]
+    cells: set[tuple[int, int, int]], shape: am.Shape, place: tuple[int, int, int]
 ) -> None:
     """As near as the nearest; one that is only touched hides none that is overlapped."""
     edge = 0.1
     middles = edge * (np.array(sorted(cells)) + 0.5)
-    thing = Thing('thing', shape, pose=Placement(np.eye(3), 0.05 * np.array(place)))
-    boxes = [PlacedShape(Box(edge, edge, edge), Placement(np.eye(3), each)) for each in middles]
+    thing = am.CollisionObject('thing', shape, pose=am.Pose(np.eye(3), 0.05 * np.array(place)))
+    boxes = [
+        am.PlacedShape(am.Box(edge, edge, edge), am.Pose(np.eye(3), each)) for each in middles
+    ]
     near = []
-    for parts in (boxes, [Cells(middles, edge)]):
-        scene = MODEL.scene.with_object(Thing(OCTOMAP_NAME, *parts)).with_object(thing)
+    for parts in (boxes, [am.Cells(middles, edge)]):
+        scene = MODEL.scene.with_object(am.CollisionObject(am.OCTOMAP_NAME, *parts)).with_object(
+            thing
+        )
         scene = scene.attached('thing', 'link_4', AT)
-        found = Clearances(scene).least(AT, np.inf)
-        pairs = [{'thing', OCTOMAP_NAME} == {*pair} for pair in scene.pairs]
+        found = am.Clearances(scene).least(AT, np.inf)
+        pairs = [{'thing', am.OCTOMAP_NAME} == {*pair} for pair in scene.pairs]
         near.append(found[pairs].min())
     by_box, by_cell = near
     if by_box > 1e-6:
@@ -118,8 +106,8 @@ def test_a_large_map_is_taken() -> None:
     blocks = list(_blocks(cubes, 0.02))
     assert len(grid) > 20_000
     assert sum(len(each.middles) for each in blocks) == len(grid)
-    scene = MODEL.scene.with_object(Thing(OCTOMAP_NAME, *blocks))
-    assert Clearances(scene).contacts(AT)
+    scene = MODEL.scene.with_object(am.CollisionObject(am.OCTOMAP_NAME, *blocks))
+    assert am.Clearances(scene).contacts(AT)
 
 
 @pytest.mark.parametrize('binary', [True, False], ids=['binary', 'full'])
@@ -127,12 +115,12 @@ def test_streams_that_are_cut_or_too_long_are_refused(binary: bool) -> None:
     """Wherever they end; never a part of the map."""
     data = stream(binary=binary)
     for length in range(1, len(data), 7):
-        with pytest.raises(SceneError, match='data end within a node, at byte'):
-            octomap_shapes('OcTree', data[:length], 0.05, binary=binary)
-    with pytest.raises(SceneError, match='the tree ends at byte'):
-        octomap_shapes('OcTree', data + b'\0', 0.05, binary=binary)
-    with pytest.raises(SceneError, match='octomap'):
-        octomap_shapes('OcTree', data, 0.05, binary=not binary)
+        with pytest.raises(am.SceneError, match='data end within a node, at byte'):
+            am.octomap_shapes('OcTree', data[:length], 0.05, binary=binary)
+    with pytest.raises(am.SceneError, match='the tree ends at byte'):
+        am.octomap_shapes('OcTree', data + b'\0', 0.05, binary=binary)
+    with pytest.raises(am.SceneError, match='octomap'):
+        am.octomap_shapes('OcTree', data, 0.05, binary=not binary)
 
 
 @pytest.mark.parametrize(
@@ -148,11 +136,13 @@ def test_streams_that_are_cut_or_too_long_are_refused(binary: bool) -> None:
 )
 def test_what_is_no_map_is_refused(kind: str, data: bytes, resolution: float, words: str) -> None:
     """With what is wrong and what to send; NaN is neither free nor occupied."""
-    with pytest.raises(SceneError, match=words):
-        octomap_shapes(kind, data, resolution, binary='occupied' not in words)
+    with pytest.raises(am.SceneError, match=words):
+        am.octomap_shapes(kind, data, resolution, binary='occupied' not in words)
 
 
-def with_map(scene: Scene, message: OctomapWithPose, *, diff: bool = True) -> Scene:
+def with_map(
+    scene: am.PlanningScene, message: OctomapWithPose, *, diff: bool = True
+) -> am.PlanningScene:
     """Return a scene after a message with an octomap."""
     change = PlanningScene(is_diff=diff)
     change.robot_state.is_diff = diff
@@ -175,25 +165,27 @@ def octomap(frame: str = '') -> OctomapWithPose:
 def test_a_map_is_an_object_of_the_scene_where_its_origin_is() -> None:
     """In the frame of its header; the next one replaces it, one without data ends it."""
     scene = with_map(MODEL.scene, octomap('link_2'))
-    found = scene.objects[OCTOMAP_NAME]
+    found = scene.objects[am.OCTOMAP_NAME]
     link = MODEL.scene.kinematics.link_pose('link_2', AT)
     assert found.pose.position == pytest.approx(link.position + link.rotation @ (1.0, 0.0, 0.0))
     assert found.pose.rotation[:, 0] == pytest.approx(link.rotation[:, 1])
-    assert with_map(scene, OctomapWithPose()).objects[OCTOMAP_NAME] == found
-    assert with_map(scene, octomap()).objects[OCTOMAP_NAME].pose.position[0] == pytest.approx(1.0)
+    assert with_map(scene, OctomapWithPose()).objects[am.OCTOMAP_NAME] == found
+    assert with_map(scene, octomap()).objects[am.OCTOMAP_NAME].pose.position[0] == pytest.approx(
+        1.0
+    )
     empty = OctomapWithPose()
     empty.octomap.id = 'OcTree'
-    assert OCTOMAP_NAME not in with_map(scene, empty).objects
-    assert OCTOMAP_NAME not in with_map(scene, OctomapWithPose(), diff=False).objects
+    assert am.OCTOMAP_NAME not in with_map(scene, empty).objects
+    assert am.OCTOMAP_NAME not in with_map(scene, OctomapWithPose(), diff=False).objects
 
 
 def test_the_name_of_the_map_is_reserved() -> None:
     """No object may have it; removing all objects keeps the map, as in MoveIt."""
     scene = with_map(MODEL.scene, octomap())
     everything = CollisionObject(operation=CollisionObject.REMOVE)
-    assert OCTOMAP_NAME in apply_planning_scene(scene, scene_change(everything), AT).objects
-    thing = CollisionObject(id=OCTOMAP_NAME, operation=CollisionObject.ADD)
+    assert am.OCTOMAP_NAME in apply_planning_scene(scene, scene_change(everything), AT).objects
+    thing = CollisionObject(id=am.OCTOMAP_NAME, operation=CollisionObject.ADD)
     thing.primitives = [SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.1])]
     for message in (thing, AttachedCollisionObject(link_name='link_3', object=thing)):
-        with pytest.raises(SceneError, match='name reserved'):
+        with pytest.raises(am.SceneError, match='name reserved'):
             apply_planning_scene(scene, scene_change(message), AT)

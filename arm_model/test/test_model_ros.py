@@ -14,15 +14,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from hypothesis import given
 from hypothesis import strategies as st
 from model_robots import chain, ready, robot
-from moveit_msgs.msg import (
-    AllowedCollisionEntry,
-    AllowedCollisionMatrix,
-    AttachedCollisionObject,
-    CollisionObject,
-    PlanningScene,
-    PlanningSceneWorld,
-    RobotState,
-)
+from moveit_msgs import msg
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -31,22 +23,7 @@ from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
 from tf2_msgs.msg import TFMessage
 
-from arm_model import (
-    Array,
-    Box,
-    combined,
-    CommandError,
-    Cone,
-    Cylinder,
-    inverse,
-    Mesh,
-    Plane,
-    Pose,
-    SceneError,
-    Shape,
-    Sphere,
-)
-from arm_model import PlanningScene as Scene
+import arm_model as am
 from arm_model.ros import apply_planning_scene, FrameOf, FrameTree, scene_change, TfListener
 
 if TYPE_CHECKING:
@@ -56,9 +33,9 @@ if TYPE_CHECKING:
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6)
 
 
-def pose(numbers: list[float]) -> Pose:
+def pose(numbers: list[float]) -> am.Pose:
     """Return the pose with a rotation vector and a position."""
-    return Pose(pin.exp3(np.array(numbers[:3])), np.array(numbers[3:]))
+    return am.Pose(pin.exp3(np.array(numbers[:3])), np.array(numbers[3:]))
 
 
 @given(ANGLES, ANGLES, ANGLES)
@@ -75,7 +52,7 @@ def test_a_frame_is_found_up_and_down_the_tree(
     tree.learn('cup', 'table', pose(tool), 5.0)
     found = tree.pose('cup', 'base', 5.5)
     assert found is not None
-    wanted = combined(inverse(pose(base)), combined(pose(table), pose(tool)))
+    wanted = am.combined(am.inverse(pose(base)), am.combined(pose(table), pose(tool)))
     assert found.position == pytest.approx(wanted.position, abs=1e-9)
     assert found.rotation == pytest.approx(wanted.rotation, abs=1e-9)
     assert tree.pose('cup', 'base', 7.0) is None
@@ -114,10 +91,10 @@ def test_transforms_that_come_late_or_are_no_numbers_do_not_count() -> None:
     """A frame is where a fresh message says; the stamp counts, not the arrival."""
     node = TfNode()
     frames = node.listener()
-    with pytest.raises(CommandError, match="Unknown frame: 'cup'"):
+    with pytest.raises(am.CommandError, match="Unknown frame: 'cup'"):
         frames.pose('cup')
     node.publish(90, 0.1)
-    with pytest.raises(CommandError, match=r"'cup' to frame 'base_link': .* 10\.0 s old"):
+    with pytest.raises(am.CommandError, match=r"'cup' to frame 'base_link': .* 10\.0 s old"):
         frames.pose('cup')
     node.publish(100, 0.2)
     node.publish(100, math.nan)
@@ -133,7 +110,7 @@ def test_a_world_that_tf_has_placed_is_no_other_name_of_the_root() -> None:
     assert frames.link('cup') == robot('gp110').kinematics.root
     node.publish(90, 0.1)
     assert frames.link('cup') is None
-    with pytest.raises(CommandError, match=r'10\.0 s old'):
+    with pytest.raises(am.CommandError, match=r'10\.0 s old'):
         frames.pose('cup')
 
 
@@ -146,25 +123,25 @@ def thing(
     place: Sequence[float] = (0.5, 0.0, 0.2),
     *,
     frame: str = '',
-    operation: bytes = CollisionObject.ADD,
+    operation: bytes = msg.CollisionObject.ADD,
     primitive: SolidPrimitive | None = None,
-) -> CollisionObject:
+) -> msg.CollisionObject:
     """Return a box at a place, or another primitive."""
     x, y, z = map(float, place)
     shape = primitive or SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.2, 0.3])
-    message = CollisionObject(id=name, operation=operation)
+    message = msg.CollisionObject(id=name, operation=operation)
     message.header.frame_id = frame
     message.pose = PoseMessage(position=Point(x=x, y=y, z=z))
-    if operation in {CollisionObject.ADD, CollisionObject.APPEND}:
+    if operation in {msg.CollisionObject.ADD, msg.CollisionObject.APPEND}:
         message.primitives = [shape]
     return message
 
 
 def attached(
     name: str, link: str, *, operation: bytes, bare: bool = True
-) -> AttachedCollisionObject:
+) -> msg.AttachedCollisionObject:
     """Return what attaches or detaches an object."""
-    message = AttachedCollisionObject(link_name=link, touch_links=['link_3'])
+    message = msg.AttachedCollisionObject(link_name=link, touch_links=['link_3'])
     message.object = thing(name, frame=link, operation=operation)
     if bare:
         message.object.primitives = []
@@ -172,11 +149,11 @@ def attached(
 
 
 def changed(
-    scene: Scene,
-    message: CollisionObject | AttachedCollisionObject,
-    positions: Array,
+    scene: am.PlanningScene,
+    message: msg.CollisionObject | msg.AttachedCollisionObject,
+    positions: am.Array,
     frame_of: FrameOf | None = None,
-) -> Scene:
+) -> am.PlanningScene:
     """Return a scene after a message of an object or an attached body."""
     return apply_planning_scene(scene, scene_change(message), positions, frame_of)
 
@@ -184,13 +161,15 @@ def changed(
 @pytest.mark.parametrize(
     ('kind', 'dimensions', 'shape'),
     [
-        (SolidPrimitive.BOX, [0.1, 0.2, 0.3], Box(0.1, 0.2, 0.3)),
-        (SolidPrimitive.SPHERE, [0.1], Sphere(0.1)),
-        (SolidPrimitive.CYLINDER, [0.4, 0.1], Cylinder(0.1, 0.4)),
-        (SolidPrimitive.CONE, [0.4, 0.1], Cone(0.1, 0.4)),
+        (SolidPrimitive.BOX, [0.1, 0.2, 0.3], am.Box(0.1, 0.2, 0.3)),
+        (SolidPrimitive.SPHERE, [0.1], am.Sphere(0.1)),
+        (SolidPrimitive.CYLINDER, [0.4, 0.1], am.Cylinder(0.1, 0.4)),
+        (SolidPrimitive.CONE, [0.4, 0.1], am.Cone(0.1, 0.4)),
     ],
 )
-def test_primitives_have_their_lengths(kind: int, dimensions: list[float], shape: Shape) -> None:
+def test_primitives_have_their_lengths(
+    kind: int, dimensions: list[float], shape: am.Shape
+) -> None:
     """The height of a cylinder comes first in the message."""
     primitive = SolidPrimitive(type=kind, dimensions=dimensions)
     scene = changed(MODEL.scene, thing(primitive=primitive), AT)
@@ -208,11 +187,11 @@ def test_prisms_meshes_and_planes() -> None:
     message.planes = [PlaneMessage(coef=[0.0, 0.0, 2.0, 0.2])]
     shapes = [each.shape for each in changed(MODEL.scene, message, AT).objects['box'].shapes]
     hull, mesh, plane = shapes
-    assert isinstance(hull, Mesh)
+    assert isinstance(hull, am.Mesh)
     assert min(map(tuple, hull.points.round(6).tolist())) == (0.0, 0.0, -0.25)
     assert len(hull.points) == 6
-    assert mesh == Mesh(points)
-    assert plane == Plane((0.0, 0.0, 2.0), -0.1)
+    assert mesh == am.Mesh(points)
+    assert plane == am.Plane((0.0, 0.0, 2.0), -0.1)
 
 
 def test_a_pose_is_in_its_frame() -> None:
@@ -223,31 +202,31 @@ def test_a_pose_is_in_its_frame() -> None:
     assert turned.objects['box'].pose.position == pytest.approx(there)
     known = changed(MODEL.scene, thing(frame='camera'), AT, lambda _: link)
     assert known.objects['box'].pose.position == pytest.approx(there)
-    with pytest.raises(SceneError, match="'box': no frame 'camera'; links: base"):
+    with pytest.raises(am.SceneError, match="'box': no frame 'camera'; links: base"):
         changed(MODEL.scene, thing(frame='camera'), AT)
 
 
 def test_an_object_is_moved_extended_and_removed() -> None:
     """APPEND keeps the shapes that are there, MOVE all of them, REMOVE without an id nothing."""
     scene = changed(MODEL.scene, thing(), AT)
-    scene = changed(scene, thing(place=(0.5, 0.0, 0.9), operation=CollisionObject.APPEND), AT)
+    scene = changed(scene, thing(place=(0.5, 0.0, 0.9), operation=msg.CollisionObject.APPEND), AT)
     first, second = scene.objects['box'].shapes
     assert second.pose.position - first.pose.position == pytest.approx([0.0, 0.0, 0.7])
-    moved = changed(scene, thing(place=(1.0, 0.0, 0.0), operation=CollisionObject.MOVE), AT)
+    moved = changed(scene, thing(place=(1.0, 0.0, 0.0), operation=msg.CollisionObject.MOVE), AT)
     assert moved.objects['box'].shapes == scene.objects['box'].shapes
     assert moved.objects['box'].pose.position.tolist() == [1.0, 0.0, 0.0]
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.0, 0.2]
-    gone = changed(moved, thing('', operation=CollisionObject.REMOVE), AT)
+    gone = changed(moved, thing('', operation=msg.CollisionObject.REMOVE), AT)
     assert not gone.objects
     nothing = "no object 'box' in the world; there are: none"
     for words, message in (
-        (nothing, thing(operation=CollisionObject.REMOVE)),
-        (nothing, thing(operation=CollisionObject.MOVE)),
+        (nothing, thing(operation=msg.CollisionObject.REMOVE)),
+        (nothing, thing(operation=msg.CollisionObject.MOVE)),
         ('has no shapes', attached('cup', 'link_4', operation=b'\0')),
         ("no link 'link_9'", attached('box', 'link_9', operation=b'\0', bare=False)),
         ("no attached object 'cup'", attached('cup', '', operation=b'\1')),
     ):
-        with pytest.raises(SceneError, match=words):
+        with pytest.raises(am.SceneError, match=words):
             changed(gone, message, AT)
 
 
@@ -259,7 +238,7 @@ def test_the_pose_of_the_only_shape_is_that_of_the_object() -> None:
     (shape,) = scene.objects['box'].shapes
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.1, 0.3]
     assert shape.pose.position.tolist() == [0.0, 0.0, 0.0]
-    moved = changed(scene, thing(place=(0.5, -0.1, 0.3), operation=CollisionObject.MOVE), AT)
+    moved = changed(scene, thing(place=(0.5, -0.1, 0.3), operation=msg.CollisionObject.MOVE), AT)
     assert moved.objects['box'].pose.position.tolist() == [0.5, -0.1, 0.3]
     assert moved.objects['box'].shapes == scene.objects['box'].shapes
     alone.pose.position.x = 1.0
@@ -282,21 +261,23 @@ def test_an_object_is_taken_up_carried_and_laid_down() -> None:
     assert cup.attached_bodies['cup'].object.pose.position == pytest.approx([0.5, 0.0, 0.2])
 
 
-def matrix(names: Sequence[str], *allowed: tuple[str, str]) -> AllowedCollisionMatrix:
+def matrix(names: Sequence[str], *allowed: tuple[str, str]) -> msg.AllowedCollisionMatrix:
     """Return a matrix in which some pairs may touch."""
     pairs = set(map(frozenset, allowed))
     rows = [[frozenset((one, other)) in pairs for other in names] for one in names]
-    entries = [AllowedCollisionEntry(enabled=row) for row in rows]
-    return AllowedCollisionMatrix(entry_names=names, entry_values=entries)
+    entries = [msg.AllowedCollisionEntry(enabled=row) for row in rows]
+    return msg.AllowedCollisionMatrix(entry_names=names, entry_values=entries)
 
 
 def scene_message(
-    *objects: CollisionObject, held: Sequence[AttachedCollisionObject] = (), is_diff: bool = False
-) -> PlanningScene:
+    *objects: msg.CollisionObject,
+    held: Sequence[msg.AttachedCollisionObject] = (),
+    is_diff: bool = False,
+) -> msg.PlanningScene:
     """Return a message."""
-    state = RobotState(attached_collision_objects=list(held), is_diff=is_diff)
-    world = PlanningSceneWorld(collision_objects=list(objects))
-    return PlanningScene(world=world, robot_state=state, is_diff=is_diff)
+    state = msg.RobotState(attached_collision_objects=list(held), is_diff=is_diff)
+    world = msg.PlanningSceneWorld(collision_objects=list(objects))
+    return msg.PlanningScene(world=world, robot_state=state, is_diff=is_diff)
 
 
 def test_a_whole_scene_replaces_and_a_diff_changes() -> None:
@@ -304,7 +285,7 @@ def test_a_whole_scene_replaces_and_a_diff_changes() -> None:
     scene = apply_planning_scene(MODEL.scene, scene_message(thing(), thing('cup')), AT)
     assert set(scene.objects) == {'box', 'cup'}
     grasp = scene_message(
-        thing(operation=CollisionObject.REMOVE),
+        thing(operation=msg.CollisionObject.REMOVE),
         held=[attached('box', 'link_4', operation=b'\0', bare=False)],
         is_diff=True,
     )
@@ -314,7 +295,7 @@ def test_a_whole_scene_replaces_and_a_diff_changes() -> None:
     assert set(held.attached_bodies) == {'box'}
     assert held.allowed.allows('cup', 'link_2')
     assert ('link_1', 'link_3') in {*held.pairs}
-    same = apply_planning_scene(held, PlanningScene(is_diff=True), AT)
+    same = apply_planning_scene(held, msg.PlanningScene(is_diff=True), AT)
     assert set(same.attached_bodies) == {'box'}
     again = apply_planning_scene(held, scene_message(thing('post')), AT)
     assert (set(again.objects), set(again.attached_bodies)) == ({'post'}, set())

@@ -14,19 +14,8 @@ from typing import Any, TYPE_CHECKING
 from ament_index_python.packages import get_package_share_directory
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from geometry_msgs.msg import Pose as PoseMessage
+from moveit_msgs import msg
 from moveit_msgs.action import MoveGroup
-from moveit_msgs.msg import (
-    CollisionObject,
-    Constraints,
-    JointConstraint,
-    MotionPlanRequest,
-    OrientationConstraint,
-    PlanningScene,
-    PlanningSceneComponents,
-    PlanningSceneWorld,
-    PositionConstraint,
-    PositionIKRequest,
-)
 from moveit_msgs.srv import (
     ApplyPlanningScene,
     GetCartesianPath,
@@ -144,7 +133,7 @@ class MoveGroupRig:
         """Wait until move_group has received where the robot is."""
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
-            state = self.scene(PlanningSceneComponents.ROBOT_STATE).robot_state.joint_state
+            state = self.scene(msg.PlanningSceneComponents.ROBOT_STATE).robot_state.joint_state
             places = dict(zip(state.name, state.position, strict=True))
             if all(abs(places[name] - at) < 1e-9 for name, at in self.positions.items()):
                 return
@@ -202,19 +191,19 @@ class MoveGroupRig:
         self.positions.update(self._begin)
         self.followed.clear()
         self.held.clear()
-        assert self.apply(PlanningScene())
+        assert self.apply(msg.PlanningScene())
         self.settle()
 
-    def apply(self, scene: PlanningScene | None = None, **parts: Any) -> bool:
+    def apply(self, scene: msg.PlanningScene | None = None, **parts: Any) -> bool:
         """Apply a scene, or a change of its parts; return whether it was accepted."""
         asked = ApplyPlanningScene.Request(scene=change(**parts) if scene is None else scene)
         return bool(self.client.call(ApplyPlanningScene, '/apply_planning_scene', asked).success)
 
-    def add(self, *things: CollisionObject) -> None:
+    def add(self, *things: msg.CollisionObject) -> None:
         """Add objects to the world, or change what they name."""
-        assert self.apply(world=PlanningSceneWorld(collision_objects=list(things)))
+        assert self.apply(world=msg.PlanningSceneWorld(collision_objects=list(things)))
 
-    def scene(self, components: int = 0) -> PlanningScene:
+    def scene(self, components: int = 0) -> msg.PlanningScene:
         """Return the scene, whole or the parts of moveit_msgs/PlanningSceneComponents."""
         asked = GetPlanningScene.Request()
         asked.components.components = components
@@ -240,7 +229,7 @@ class MoveGroupRig:
     def ik(self, pose: PoseMessage, frame: str = '', **fields: Any) -> Any:
         """Return the response of compute_ik for a pose of the Panda's hand."""
         asked = GetPositionIK.Request()
-        asked.ik_request = PositionIKRequest(**{'group_name': 'panda_arm'} | fields)
+        asked.ik_request = msg.PositionIKRequest(**{'group_name': 'panda_arm'} | fields)
         asked.ik_request.pose_stamped.pose = pose
         asked.ik_request.pose_stamped.header.frame_id = frame
         return self.client.call(GetPositionIK, '/compute_ik', asked)
@@ -252,7 +241,7 @@ class MoveGroupRig:
         asked.start_state.is_diff = True
         return self.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
 
-    def plan(self, request: MotionPlanRequest) -> Any:
+    def plan(self, request: msg.MotionPlanRequest) -> Any:
         """Return the moveit_msgs/MotionPlanResponse of plan_kinematic_path."""
         self._refresh()
         asked = GetMotionPlan.Request(motion_plan_request=request)
@@ -289,48 +278,48 @@ class MoveGroupRig:
         self.client.__exit__(*exception)
 
 
-def change(**parts: Any) -> PlanningScene:
+def change(**parts: Any) -> msg.PlanningScene:
     """Return a change of parts of the scene."""
-    scene = PlanningScene(is_diff=True, **parts)
+    scene = msg.PlanningScene(is_diff=True, **parts)
     scene.robot_state.is_diff = True
     return scene
 
 
-def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> Constraints:
+def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> msg.Constraints:
     """Return a goal of joints, as MoveGroupInterface makes it."""
     within = {'tolerance_above': 1e-4, 'tolerance_below': 1e-4, 'weight': 1.0}
-    return Constraints(
+    return msg.Constraints(
         joint_constraints=[
-            JointConstraint(joint_name=name, position=position, **within)
+            msg.JointConstraint(joint_name=name, position=position, **within)
             for name, position in zip(joints, positions, strict=True)
         ]
     )
 
 
-def pose_goal(pose: PoseMessage, link: str, frame: str) -> Constraints:
+def pose_goal(pose: PoseMessage, link: str, frame: str) -> msg.Constraints:
     """Return a goal of a pose, as MoveGroupInterface makes it."""
-    place = PositionConstraint(link_name=link, weight=1.0)
+    place = msg.PositionConstraint(link_name=link, weight=1.0)
     ball = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1e-4])
     place.constraint_region.primitives = [ball]
     place.constraint_region.primitive_poses = [PoseMessage(position=pose.position)]
-    turn = OrientationConstraint(link_name=link, orientation=pose.orientation, weight=1.0)
+    turn = msg.OrientationConstraint(link_name=link, orientation=pose.orientation, weight=1.0)
     turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = 1e-3
     turn.absolute_z_axis_tolerance = 1e-3
     place.header.frame_id = turn.header.frame_id = frame
-    return Constraints(position_constraints=[place], orientation_constraints=[turn])
+    return msg.Constraints(position_constraints=[place], orientation_constraints=[turn])
 
 
 def motion_request(
-    goal: Constraints, group: str = 'panda_arm', **others: Any
-) -> MotionPlanRequest:
+    goal: msg.Constraints, group: str = 'panda_arm', **others: Any
+) -> msg.MotionPlanRequest:
     """Return a request from where the robot is."""
     fields: dict[str, Any] = {'num_planning_attempts': 1, 'allowed_planning_time': 10.0}
-    request = MotionPlanRequest(group_name=group, goal_constraints=[goal], **fields | others)
+    request = msg.MotionPlanRequest(group_name=group, goal_constraints=[goal], **fields | others)
     request.start_state.is_diff = True
     return request
 
 
-def action_goal(request: MotionPlanRequest, *, plan_only: bool = False) -> MoveGroup.Goal:
+def action_goal(request: msg.MotionPlanRequest, *, plan_only: bool = False) -> MoveGroup.Goal:
     """Return a goal of move_action, as MoveGroupInterface makes it."""
     goal = MoveGroup.Goal(request=request)
     goal.planning_options.plan_only = plan_only

@@ -7,21 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from arm_model import (
-    Array,
-    Box,
-    CollisionObject,
-    Cone,
-    Cylinder,
-    frozen,
-    JointLimits,
-    ORIGIN,
-    PlacedShape,
-    PlanningScene,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+import arm_model as am
 from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
 from arm_trajectory import Path
 
@@ -30,14 +16,14 @@ RATE_TOLERANCE = 1e-6  # share by which a limit may be exceeded, for rounding
 
 
 def with_box(
-    scene: PlanningScene, name: str, size: tuple[float, float, float], at: tuple[float, ...]
-) -> PlanningScene:
+    scene: am.PlanningScene, name: str, size: tuple[float, float, float], at: tuple[float, ...]
+) -> am.PlanningScene:
     """Return a scene with a box."""
-    place = Pose(ORIGIN.rotation, frozen(at))
-    return scene.with_object(CollisionObject(name, Box(*size), pose=place))
+    place = am.Pose(am.ORIGIN.rotation, am.frozen(at))
+    return scene.with_object(am.CollisionObject(name, am.Box(*size), pose=place))
 
 
-def with_random_boxes(model: RobotModel, count: int, seed: int) -> PlanningScene:
+def with_random_boxes(model: am.RobotModel, count: int, seed: int) -> am.PlanningScene:
     """Return the scene of an arm with boxes about it."""
     scene, size = model.scene, max(model.reach, 1.0)
     draw = np.random.default_rng(seed)
@@ -50,44 +36,46 @@ def with_random_boxes(model: RobotModel, count: int, seed: int) -> PlanningScene
     return scene
 
 
-def near(pose: Pose, shape: Box | Sphere, turn: Array) -> PathConstraints:
+def near(pose: am.Pose, shape: am.Box | am.Sphere, turn: am.Array) -> PathConstraints:
     """Return what holds where the tip is in a shape about a pose, and turned by angles at most."""
-    region = PlacedShape(shape, Pose(ORIGIN.rotation, pose.position))
+    region = am.PlacedShape(shape, am.Pose(am.ORIGIN.rotation, pose.position))
     return PathConstraints(
         orientations=[OrientationConstraint('', pose.rotation, turn)],
-        positions=[PositionConstraint('', ORIGIN.position, [region])],
+        positions=[PositionConstraint('', am.ORIGIN.position, [region])],
     )
 
 
-def holds(shape: Box | Sphere | Cylinder | Cone, point: Array, margin: float) -> bool:
+def holds(
+    shape: am.Box | am.Sphere | am.Cylinder | am.Cone, point: am.Array, margin: float
+) -> bool:
     """Return whether a shape holds a point, or nearly; a cone has its tip above its middle."""
     x, y, z = point
     aside = np.hypot(x, y)
     match shape:
-        case Box():
+        case am.Box():
             inside = np.abs(point) <= 0.5 * np.array([shape.x, shape.y, shape.z]) + margin
             return bool(inside.all())
-        case Sphere():
+        case am.Sphere():
             return bool(np.hypot(aside, z) <= shape.radius + margin)
-        case Cylinder():
+        case am.Cylinder():
             return bool(aside <= shape.radius + margin and abs(z) <= 0.5 * shape.length + margin)
-        case Cone():
+        case am.Cone():
             half = 0.5 * shape.length
             radius = shape.radius * (half - z) / shape.length
             return bool(aside <= radius + margin and abs(z) <= half + margin)
 
 
-def dense_times(path: Path) -> Array:
+def dense_times(path: Path) -> am.Array:
     """Return times between which no joint moves by more than :data:`DENSE`."""
     coarse = np.linspace(0.0, path.duration, 2000)
     turned = np.abs(np.diff(path.positions(coarse), axis=0)).max(axis=1)
     along = np.concatenate(((0.0,), np.cumsum(turned)))
     count = int(np.ceil(along[-1] / DENSE)) + 1
-    times: Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
+    times: am.Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
     return times
 
 
-def distances(scene: PlanningScene, places: Array) -> Array:
+def distances(scene: am.PlanningScene, places: am.Array) -> am.Array:
     """Return the distance of each pair at each place in [m] (m, k).
 
     All are measured anew by pinocchio and coal: neither what was known of a place before, nor how
@@ -103,12 +91,12 @@ def distances(scene: PlanningScene, places: Array) -> Array:
     return np.array(found)
 
 
-def deepest_overlap(path: Path, scene: PlanningScene) -> float:
+def deepest_overlap(path: Path, scene: am.PlanningScene) -> float:
     """Return the least distance of any pair at the places of the independent sampler in [m]."""
     return float(distances(scene, path.positions(dense_times(path))).min(initial=np.inf))
 
 
-def broken_limits(path: Path, limits: JointLimits) -> list[str]:
+def broken_limits(path: Path, limits: am.JointLimits) -> list[str]:
     """Return what exceeds a limit on a path, looked at from its values alone."""
     segments = np.repeat(np.arange(len(path.durations)), 200)
     shares = np.tile(np.linspace(0.0, 1.0, 200), len(path.durations))

@@ -23,20 +23,7 @@ from move_group_rig import (
     pose_goal,
     READY,
 )
-from moveit_msgs.msg import (
-    AllowedCollisionMatrix,
-    AttachedCollisionObject,
-    CollisionObject,
-    Constraints,
-    JointConstraint,
-    LinkPadding,
-    LinkScale,
-    MotionPlanRequest,
-    MotionSequenceItem,
-    OrientationConstraint,
-    PlanningScene,
-    PlanningSceneWorld,
-)
+from moveit_msgs import msg
 from moveit_msgs.srv import GetMotionSequence, GetPositionFK
 from planning_messages import box, pose_at, tetrahedron
 import pytest
@@ -57,19 +44,19 @@ def down(x: float, y: float, z: float) -> PoseMessage:
     return pose
 
 
-def near(joint: str, position: float) -> JointConstraint:
+def near(joint: str, position: float) -> msg.JointConstraint:
     """Return that a joint stays where it is."""
     (message,) = joint_goal([position], [joint]).joint_constraints
     message.tolerance_above = message.tolerance_below = 0.05
     return message
 
 
-def in_front() -> Constraints:
+def in_front() -> msg.Constraints:
     """Return a goal that can be reached."""
     return pose_goal(down(0.4, 0.1, 0.5), HAND, 'panda_link0')
 
 
-def changed(goal: Constraints, *changes: tuple[str, Any]) -> MotionPlanRequest:
+def changed(goal: msg.Constraints, *changes: tuple[str, Any]) -> msg.MotionPlanRequest:
     """Return a request for a goal after changes of fields, which are named by their paths."""
     goal = deepcopy(goal)
     for path, value in changes:
@@ -81,7 +68,7 @@ def changed(goal: Constraints, *changes: tuple[str, Any]) -> MotionPlanRequest:
     return motion_request(goal)
 
 
-def with_start(positions: list[float], names: list[str] | None = None) -> MotionPlanRequest:
+def with_start(positions: list[float], names: list[str] | None = None) -> msg.MotionPlanRequest:
     """Return a request from a state."""
     request = motion_request(joint_goal(MOVED))
     joints = [each.joint_name for each in joint_goal(MOVED).joint_constraints]
@@ -90,7 +77,7 @@ def with_start(positions: list[float], names: list[str] | None = None) -> Motion
     return request
 
 
-def up(tolerance: float = 0.1) -> OrientationConstraint:
+def up(tolerance: float = 0.1) -> msg.OrientationConstraint:
     """Return that the hand looks up, which it does not."""
     (turn,) = pose_goal(PoseMessage(), HAND, 'panda_link0').orientation_constraints
     turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = tolerance
@@ -105,7 +92,7 @@ TWICE = [*JOINT.joint_constraints, near('panda_joint1', MOVED[0] + 0.5)]
 FOLDED = [0.0, 1.7, 0.0, -2.9, 0.0, 1.57, 0.785]  # where the hand touches the base in [rad]
 
 
-Refusal = tuple[str, MotionPlanRequest, PlanningCode, str]
+Refusal = tuple[str, msg.MotionPlanRequest, PlanningCode, str]
 """Name of a bad request, the request, the code and words of the refusal."""
 
 
@@ -114,8 +101,8 @@ def bad_goals() -> Iterator[Refusal]:
     bad_goal = CODE.INVALID_GOAL_CONSTRAINTS
     yield 'empty group', motion_request(JOINT, ''), CODE.INVALID_GROUP_NAME, 'empty; groups: panda'
     yield 'unknown group', motion_request(JOINT, 'legs'), CODE.INVALID_GROUP_NAME, "'legs'.*panda"
-    yield 'no goal', MotionPlanRequest(group_name='panda_arm'), bad_goal, 'no goal'
-    yield 'empty goal', motion_request(Constraints()), bad_goal, '0 position'
+    yield 'no goal', msg.MotionPlanRequest(group_name='panda_arm'), bad_goal, 'no goal'
+    yield 'empty goal', motion_request(msg.Constraints()), bad_goal, '0 position'
     moon = (f'{PLACE}.link_name', 'moon'), (f'{TURN}.link_name', 'moon')
     yield 'unknown link', changed(POSE, *moon), CODE.INVALID_LINK_NAME, 'moon'
     for name, goal, path, value, words in (
@@ -157,13 +144,13 @@ def bad_rest() -> Iterator[Refusal]:
     yield 'start of another robot', with_start([0.0], ['knee']), bad_state, "'knee'"
     yield 'start with a number less', with_start(READY[1:]), bad_state, '7 names and 6'
     two = [near('panda_joint1', 0.0), near('panda_joint1', 0.4)]
-    against_start = CODE.START_STATE_VIOLATES_PATH_CONSTRAINTS
+    against, level = CODE.START_STATE_VIOLATES_PATH_CONSTRAINTS, [up()]
     for name, path, code, words in (
-        ('start against path', Constraints(orientation_constraints=[up()]), against_start, HAND),
-        ('goal against path', Constraints(joint_constraints=two[:1]),
+        ('start against path', msg.Constraints(orientation_constraints=level), against, HAND),
+        ('goal against path', msg.Constraints(joint_constraints=two[:1]),
          CODE.GOAL_VIOLATES_PATH_CONSTRAINTS, 'panda_joint1'),
-        ('contradictory path', Constraints(joint_constraints=two), bad_goal, '1 contradict'),
-        ('nan path', Constraints(orientation_constraints=[up(NAN)]), bad_goal, 'nan'),
+        ('contradictory path', msg.Constraints(joint_constraints=two), bad_goal, '1 contradict'),
+        ('nan path', msg.Constraints(orientation_constraints=[up(NAN)]), bad_goal, 'nan'),
     ):  # fmt: skip
         yield name, motion_request(JOINT, path_constraints=path), code, words
     for name, field, value, code, words in (
@@ -218,7 +205,7 @@ def test_pilz_pipeline_has_the_same_codes(rig: MoveGroupRig, name: str) -> None:
     request.pipeline_id, request.planner_id = 'pilz_industrial_motion_planner', 'PTP'
     check(rig.plan(request).error_code, code, words)
     sequence = GetMotionSequence.Request()
-    sequence.request.items = [MotionSequenceItem(req=request)]
+    sequence.request.items = [msg.MotionSequenceItem(req=request)]
     answer = rig.client.call(GetMotionSequence, '/plan_sequence_path', sequence).response
     check(answer.error_code, code, words)
 
@@ -231,12 +218,12 @@ def mesh(z: float, corner: int = 3) -> MeshMessage:
     return message
 
 
-def in_world(thing: CollisionObject) -> PlanningScene:
+def in_world(thing: msg.CollisionObject) -> msg.PlanningScene:
     """Return a change of an object in the world."""
-    return change(world=PlanningSceneWorld(collision_objects=[thing]))
+    return change(world=msg.PlanningSceneWorld(collision_objects=[thing]))
 
 
-def crate(**fields: Any) -> PlanningScene:
+def crate(**fields: Any) -> msg.PlanningScene:
     """Return a change that adds a box with other fields."""
     thing = box('crate', 0.5, 0.0, 0.5)
     for name, value in fields.items():
@@ -244,22 +231,22 @@ def crate(**fields: Any) -> PlanningScene:
     return in_world(thing)
 
 
-def ghost(operation: bytes) -> PlanningScene:
+def ghost(operation: bytes) -> msg.PlanningScene:
     """Return a change of an object that there is not."""
-    return in_world(CollisionObject(id='ghost', operation=operation))
+    return in_world(msg.CollisionObject(id='ghost', operation=operation))
 
 
-def attached(link: str, *touched: str, bare: bool = False) -> PlanningScene:
+def attached(link: str, *touched: str, bare: bool = False) -> msg.PlanningScene:
     """Return a change that attaches a box, or what is in the world."""
-    thing = CollisionObject(id='held') if bare else box('held', 0.5, 0.0, 0.5)
+    thing = msg.CollisionObject(id='held') if bare else box('held', 0.5, 0.0, 0.5)
     scene = change()
     scene.robot_state.attached_collision_objects = [
-        AttachedCollisionObject(link_name=link, object=thing, touch_links=touched)
+        msg.AttachedCollisionObject(link_name=link, object=thing, touch_links=touched)
     ]
     return scene
 
 
-def twice() -> PlanningScene:
+def twice() -> msg.PlanningScene:
     """Return a change that attaches a box and adds it to the world."""
     scene = attached(HAND)
     scene.world.collision_objects = [box('held', 0.0, 0.5, 0.5)]
@@ -267,7 +254,7 @@ def twice() -> PlanningScene:
 
 
 NO_OBJECT, NO_LINK, OTHER = CODE.INVALID_OBJECT_NAME, CODE.INVALID_LINK_NAME, CODE.FAILURE
-SCENES: dict[str, tuple[PlanningScene, PlanningCode, str]] = {
+SCENES: dict[str, tuple[msg.PlanningScene, PlanningCode, str]] = {
     'empty mesh': (crate(meshes=[MeshMessage()]), OTHER, "'crate': .*no volume"),
     'flat mesh': (crate(meshes=[mesh(0.0)]), OTHER, "'crate': .*flat"),
     'unknown corner': (crate(meshes=[mesh(0.1, 9)]), OTHER, 'vertex 9'),
@@ -287,22 +274,24 @@ SCENES: dict[str, tuple[PlanningScene, PlanningCode, str]] = {
     'two poses of a box': (crate(primitive_poses=[pose_at(0.0)] * 2), OTHER, '1 primitive shapes'),
     'no name': (crate(id=''), NO_OBJECT, 'name'),
     'name of a link': (crate(id='panda_link3'), NO_OBJECT, 'link'),
-    'no shape': (ghost(CollisionObject.ADD), OTHER, "'ghost'.*shape"),
-    'removal of an unknown object': (ghost(CollisionObject.REMOVE), NO_OBJECT, "'ghost'"),
-    'move of an unknown object': (ghost(CollisionObject.MOVE), NO_OBJECT, "'ghost'"),
+    'no shape': (ghost(msg.CollisionObject.ADD), OTHER, "'ghost'.*shape"),
+    'removal of an unknown object': (ghost(msg.CollisionObject.REMOVE), NO_OBJECT, "'ghost'"),
+    'move of an unknown object': (ghost(msg.CollisionObject.MOVE), NO_OBJECT, "'ghost'"),
     'attached unknown object': (attached(HAND, bare=True), NO_OBJECT, 'no object'),
     'attached to an unknown link': (attached('claw'), NO_LINK, "'claw'"),
     'touching an unknown link': (attached(HAND, 'claw'), NO_LINK, "'claw'"),
     'attached and in the world': (twice(), NO_OBJECT, 'attached to panda_link8'),
     'padding of an unknown link': (
-        change(link_padding=[LinkPadding(link_name='claw')]), NO_LINK, "'claw'"
+        change(link_padding=[msg.LinkPadding(link_name='claw')]), NO_LINK, "'claw'"
     ),
     'negative padding': (
-        change(link_padding=[LinkPadding(link_name=HAND, padding=-0.1)]), OTHER, '-0.1'
+        change(link_padding=[msg.LinkPadding(link_name=HAND, padding=-0.1)]), OTHER, '-0.1'
     ),
-    'scale of zero': (change(link_scale=[LinkScale(link_name=HAND, scale=0.0)]), OTHER, 'scale'),
+    'scale of zero': (
+        change(link_scale=[msg.LinkScale(link_name=HAND, scale=0.0)]), OTHER, 'scale'
+    ),
     'matrix without rows': (
-        change(allowed_collision_matrix=AllowedCollisionMatrix(entry_names=['a', 'b'])),
+        change(allowed_collision_matrix=msg.AllowedCollisionMatrix(entry_names=['a', 'b'])),
         OTHER,
         'entry_values',
     ),

@@ -28,20 +28,8 @@ from move_group_rig import (
     pose_goal,
     READY,
 )
+from moveit_msgs import msg
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
-from moveit_msgs.msg import (
-    AllowedCollisionEntry,
-    AttachedCollisionObject,
-    CollisionObject,
-    DisplayTrajectory,
-    MotionPlanRequest,
-    MotionSequenceItem,
-    MoveItErrorCodes,
-    PlanningScene,
-    PlanningSceneComponents,
-    PlanningSceneWorld,
-    RobotState,
-)
 from moveit_msgs.srv import (
     GetMotionPlan,
     GetMotionSequence,
@@ -63,10 +51,10 @@ from node_runner import LATCHED
 
 BASE = 'panda_link0'
 MOVED = [0.4, *READY[1:]]
-SUCCESS = MoveItErrorCodes.SUCCESS
+SUCCESS = msg.MoveItErrorCodes.SUCCESS
 
 
-def interface_request(goal: Any) -> MotionPlanRequest:
+def interface_request(goal: Any) -> msg.MotionPlanRequest:
     """Return a request as MoveGroupInterface::constructMotionPlanRequest fills it."""
     request = motion_request(goal)
     request.allowed_planning_time = 5.0
@@ -221,32 +209,32 @@ def test_planning_scene_interface(rig: MoveGroupRig) -> None:
     """applyCollisionObjects, getKnownObjectNames, getObjects, attach by topic, detach, remove."""
 
     def names() -> set[str]:
-        found = rig.scene(PlanningSceneComponents.WORLD_OBJECT_NAMES)
+        found = rig.scene(msg.PlanningSceneComponents.WORLD_OBJECT_NAMES)
         assert found.is_diff  # an answer with parts only is a change
         assert not any(each.primitives for each in found.world.collision_objects)
         return {each.id for each in found.world.collision_objects}
 
     rig.add(box('cup', 0.5, 0.3, 0.3, edge=0.05))
     assert names() == {'cup'}
-    geometry = rig.scene(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+    geometry = rig.scene(msg.PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
     assert geometry.world.collision_objects[0].primitives[0].dimensions[0] == 0.05
     # MoveGroupInterface::attachObject publishes with depth 1, the id only
-    publisher = rig.publisher(AttachedCollisionObject, '/attached_collision_object')
-    attach = AttachedCollisionObject(link_name=HAND, touch_links=['panda_hand'])
-    attach.object.id, attach.object.operation = 'cup', CollisionObject.ADD
+    publisher = rig.publisher(msg.AttachedCollisionObject, '/attached_collision_object')
+    attach = msg.AttachedCollisionObject(link_name=HAND, touch_links=['panda_hand'])
+    attach.object.id, attach.object.operation = 'cup', msg.CollisionObject.ADD
     publisher.publish(attach)
 
     def attached() -> set[str]:
-        found = rig.scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        found = rig.scene(msg.PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return {each.object.id for each in found.robot_state.attached_collision_objects}
 
     rig.client.spin_until(lambda: attached() == {'cup'} and not names(), 30.0, 'the attached cup')
     place = rig.fk('cup').position
     assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.3, 0.3))
-    attach.object.operation = CollisionObject.REMOVE
+    attach.object.operation = msg.CollisionObject.REMOVE
     publisher.publish(attach)
     rig.client.spin_until(lambda: names() == {'cup'} and not attached(), 30.0, 'the cup laid down')
-    rig.add(CollisionObject(id='cup', operation=CollisionObject.REMOVE))
+    rig.add(msg.CollisionObject(id='cup', operation=msg.CollisionObject.REMOVE))
     assert names() == set()
 
 
@@ -256,8 +244,8 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     rig.client.spin_until(lambda: bool(semantic), 20.0, 'the SRDF')
     assert '<group name="panda_arm">' in semantic[0].data
     # its monitor listens with the system's default, which is volatile, and asks for the rest
-    monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', 100)
-    displayed = rig.client.listen(DisplayTrajectory, '/display_planned_path', 2)
+    monitored = rig.client.listen(msg.PlanningScene, '/monitored_planning_scene', 100)
+    displayed = rig.client.listen(msg.DisplayTrajectory, '/display_planned_path', 2)
     whole = rig.scene((1 << 10) - 1)
     assert not whole.is_diff
     frame = whole.robot_state.joint_state.header.frame_id
@@ -269,7 +257,7 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     assert {each.pipeline_id for each in described} >= {'ompl', 'pilz_industrial_motion_planner'}
     assert all(each.name and each.planner_ids for each in described)
     # Publish Scene; another node's monitor sees it
-    publisher = rig.publisher(PlanningScene, '/planning_scene')
+    publisher = rig.publisher(msg.PlanningScene, '/planning_scene')
     whole.world.collision_objects = [box('crate', 0.0, 0.8, 0.2, edge=0.2)]
     publisher.publish(whole)
 
@@ -289,7 +277,7 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     # Stop, with nothing on its way, and Clear octomap
     rig.publisher(String, '/trajectory_execution_event').publish(String(data='stop'))
     rig.client.call(Empty, '/clear_octomap', Empty.Request())
-    publisher.publish(PlanningScene())
+    publisher.publish(msg.PlanningScene())
     rig.client.spin_until(lambda: not shown(), 30.0, 'the scene without it')
 
 
@@ -316,7 +304,7 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     rig.settle()
     # compute_fk and compute_ik there and back, with a state for the start
     pose = rig.fk()
-    start = RobotState(joint_state=JointState(name=JOINTS, position=READY))
+    start = msg.RobotState(joint_state=JointState(name=JOINTS, position=READY))
     solved = rig.ik(pose, BASE, avoid_collisions=True, robot_state=start)
     assert solved.error_code.val == SUCCESS, solved.error_code
     found = rig.fk(HAND, solved.solution).position
@@ -324,12 +312,12 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
         placed(pose).position, abs=1e-4
     )
     # allow_collisions(): the scene is read, its matrix widened, and sent back as a whole
-    publisher = rig.publisher(CollisionObject, '/collision_object')
+    publisher = rig.publisher(msg.CollisionObject, '/collision_object')
     place = rig.fk().position
     publisher.publish(box('tool', place.x, place.y, place.z, edge=0.05))
     rig.client.spin_until(lambda: rig.objects() == ['tool'], 30.0, 'the tool')
     blocked = rig.plan(motion_request(joint_goal(READY)))
-    assert blocked.error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    assert blocked.error_code.val == msg.MoveItErrorCodes.START_STATE_IN_COLLISION
     whole = rig.scene()
     matrix = whole.allowed_collision_matrix
     matrix.default_entry_names = [*matrix.default_entry_names, 'tool']
@@ -338,7 +326,7 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     allowed = rig.plan(motion_request(joint_goal(READY)))
     assert allowed.error_code.val == SUCCESS, allowed.error_code
     # clear_all_collision_objects(): one message without an id
-    publisher.publish(CollisionObject(operation=CollisionObject.REMOVE))
+    publisher.publish(msg.CollisionObject(operation=msg.CollisionObject.REMOVE))
     rig.client.spin_until(lambda: not rig.objects(), 30.0, 'an empty scene')
 
 
@@ -354,7 +342,7 @@ def test_goals_and_path_constraints_of_what_is_held(
     held.subframe_poses = [turned_pose(0.05, 0.0, 0.03, axis=(0.0, 0.0, 1.0))]
     scene = change()
     scene.robot_state.attached_collision_objects = [
-        AttachedCollisionObject(link_name=HAND, object=held, touch_links=['panda_link7'])
+        msg.AttachedCollisionObject(link_name=HAND, object=held, touch_links=['panda_link7'])
     ]
     assert rig.apply(scene)
     in_hand = placed(held.pose)
@@ -384,12 +372,12 @@ def test_goals_and_path_constraints_of_what_is_held(
         assert place_of(at(rig)).rotation == pytest.approx(begin.rotation, abs=2e-3)
     kept.constraint_region.primitive_poses[0].position.x += 0.1
     refused = rig.plan(request).error_code
-    assert refused.val == MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, refused
+    assert refused.val == msg.MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, refused
 
 
 def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroupRig) -> None:
     """Defaults stay defaults, the upper triangle counts, REMOVE forgets what a name may touch."""
-    place, touching = rig.fk().position, MoveItErrorCodes.START_STATE_IN_COLLISION
+    place, touching = rig.fk().position, msg.MoveItErrorCodes.START_STATE_IN_COLLISION
 
     def cup(operation: bytes) -> None:
         rig.add(box('cup', place.x, place.y, place.z, edge=0.05, operation=operation))
@@ -398,7 +386,7 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
         assert rig.apply(allowed_collision_matrix=matrix)
         return int(rig.plan(motion_request(joint_goal(READY))).error_code.val)
 
-    cup(CollisionObject.ADD)
+    cup(msg.CollisionObject.ADD)
     matrix = rig.scene().allowed_collision_matrix
     names = list(matrix.entry_names)
     assert outcome(matrix) == touching
@@ -410,7 +398,7 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
     kept = [number for number, name in enumerate(read.entry_names) if name != 'cup']
     read.entry_names = [read.entry_names[number] for number in kept]
     rows = [[read.entry_values[row].enabled[each] for each in kept] for row in kept]
-    read.entry_values = [AllowedCollisionEntry(enabled=row) for row in rows]
+    read.entry_values = [msg.AllowedCollisionEntry(enabled=row) for row in rows]
     read.default_entry_values = [False]
     assert list(read.entry_names) == names
     assert outcome(read) == touching
@@ -421,11 +409,11 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
         for row in filled.entry_values:
             row.enabled = [*row.enabled, is_upper]
         last = [*([not is_upper] * len(names)), False]
-        filled.entry_values.append(AllowedCollisionEntry(enabled=last))
+        filled.entry_values.append(msg.AllowedCollisionEntry(enabled=last))
         for _ in range(2):  # the second one says nothing new
             assert outcome(filled) == (SUCCESS if is_upper else touching)
-        cup(CollisionObject.REMOVE)
-        cup(CollisionObject.ADD)
+        cup(msg.CollisionObject.REMOVE)
+        cup(msg.CollisionObject.ADD)
         found = rig.scene().allowed_collision_matrix
         assert found == read
         assert outcome(found) == touching
@@ -433,13 +421,13 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
 
 def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     """Of a mesh of many vertices few corners around all; nothing where only the robot moves."""
-    monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
-    collisions = rig.client.listen(PlanningScene, '/collision_scene', LATCHED)
+    monitored = rig.client.listen(msg.PlanningScene, '/monitored_planning_scene', LATCHED)
+    collisions = rig.client.listen(msg.PlanningScene, '/collision_scene', LATCHED)
     draw = np.random.default_rng(0).normal(size=(3000, 3))
     points = 0.2 * draw / np.linalg.norm(draw, axis=1, keepdims=True)
     rig.add(in_base('rock', mesh(points.tolist(), np.arange(3000).reshape(-1, 3).tolist())))
 
-    def rocks(scenes: list[PlanningScene]) -> list[Mesh]:
+    def rocks(scenes: list[msg.PlanningScene]) -> list[Mesh]:
         return [each.meshes[0] for each in scenes[-1].world.collision_objects] if scenes else []
 
     rig.client.spin_until(lambda: bool(rocks(collisions) and rocks(monitored)), 30.0, 'the rock')
@@ -451,7 +439,7 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     before, shown = len(collisions), len(monitored)
     rig.positions[JOINTS[0]] += 0.2
     rig.client.spin_until(lambda: len(monitored) > shown, 30.0, 'the robot at rest elsewhere')
-    rig.add(CollisionObject(operation=CollisionObject.REMOVE))
+    rig.add(msg.CollisionObject(operation=msg.CollisionObject.REMOVE))
     rig.client.spin_until(lambda: not rocks(collisions), 30.0, 'the scene without the rock')
     assert len(collisions) == before + 1
 
@@ -462,9 +450,9 @@ def mesh(corners: Sequence[Sequence[float]], faces: Sequence[Sequence[int]]) -> 
     return Mesh(vertices=vertices, triangles=[MeshTriangle(vertex_indices=each) for each in faces])
 
 
-def in_base(name: str, shape: Mesh) -> CollisionObject:
+def in_base(name: str, shape: Mesh) -> msg.CollisionObject:
     """Return an object of a mesh, beside the arm."""
-    thing = CollisionObject(id=name, pose=pose_at(-0.5, 0.9), meshes=[shape])
+    thing = msg.CollisionObject(id=name, pose=pose_at(-0.5, 0.9), meshes=[shape])
     thing.header.frame_id = BASE
     return thing
 
@@ -487,7 +475,7 @@ def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
     corner.pose = pose_at(place.x - 0.35, place.y - 0.35, place.z - 0.1)
     rig.add(corner)
     refused = rig.move(goal)[1].error_code
-    assert refused.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    assert refused.val == msg.MoveItErrorCodes.START_STATE_IN_COLLISION
     assert note in refused.message
     rig.add(in_base('corner', tetrahedron(0.2)))
     answer = rig.move(goal)[1].error_code
@@ -497,19 +485,19 @@ def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
 def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> None:
     """Whatever the scene of a goal says in is_diff; an empty one changes nothing."""
     rig.add(box('old', 0.0, 0.9, 0.2))
-    publisher = rig.publisher(PlanningSceneWorld, '/planning_scene_world')
-    world = PlanningSceneWorld(collision_objects=[box('new', 0.0, -0.9, 0.2)])
+    publisher = rig.publisher(msg.PlanningSceneWorld, '/planning_scene_world')
+    world = msg.PlanningSceneWorld(collision_objects=[box('new', 0.0, -0.9, 0.2)])
     publisher.publish(world)
     rig.client.spin_until(lambda: rig.objects() == ['new'], 30.0, 'the world that was published')
     goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
-    goal.planning_options.planning_scene_diff = PlanningScene()
+    goal.planning_options.planning_scene_diff = msg.PlanningScene()
     assert rig.move(goal)[1].error_code.val == SUCCESS
     place = rig.fk().position
     at_tip = box('part', place.x, place.y, place.z, edge=0.05)
     goal.planning_options.planning_scene_diff.world.collision_objects = [at_tip]
-    assert rig.move(goal)[1].error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    assert rig.move(goal)[1].error_code.val == msg.MoveItErrorCodes.START_STATE_IN_COLLISION
     assert rig.objects() == ['new']
-    publisher.publish(PlanningSceneWorld())
+    publisher.publish(msg.PlanningSceneWorld())
     rig.client.spin_until(lambda: not rig.objects(), 30.0, 'an empty world')
 
 
@@ -520,7 +508,7 @@ def test_items_of_a_sequence_begin_where_the_one_before_ends(rig: MoveGroupRig) 
     requests = [motion_request(each, planner_id='PTP') for each in goals]
     requests.append(motion_request(pose_goal(lifted, HAND, HAND), planner_id='LIN'))
     asked = GetMotionSequence.Request()
-    asked.request.items = [MotionSequenceItem(req=each) for each in requests]
+    asked.request.items = [msg.MotionSequenceItem(req=each) for each in requests]
     answer = rig.client.call(GetMotionSequence, '/plan_sequence_path', asked).response
     assert answer.error_code.val == SUCCESS, answer.error_code
     end = answer.planned_trajectories[0].joint_trajectory.points[-1].positions

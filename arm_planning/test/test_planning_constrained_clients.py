@@ -29,12 +29,7 @@ from move_group_rig import (
     READY,
     robots,
 )
-from moveit_msgs.msg import (
-    Constraints,
-    MotionPlanRequest,
-    MoveItErrorCodes,
-    OrientationConstraint,
-)
+from moveit_msgs import msg
 import numpy as np
 from numpy.typing import NDArray
 import pinocchio as pin
@@ -93,12 +88,12 @@ def angles(rotation: Array) -> dict[int, Array]:
     (_, _, y), (_, _, x), (_, _, w) = rotation.tolist()
     found = [math.atan2(-x, w), math.asin(max(-1.0, min(1.0, y)))]
     return {
-        OrientationConstraint.XYZ_EULER_ANGLES: np.array(found),
-        OrientationConstraint.ROTATION_VECTOR: pin.log3(rotation),
+        msg.OrientationConstraint.XYZ_EULER_ANGLES: np.array(found),
+        msg.OrientationConstraint.ROTATION_VECTOR: pin.log3(rotation),
     }
 
 
-def cases() -> dict[str, tuple[Constraints, Callable[[Array], float]]]:
+def cases() -> dict[str, tuple[msg.Constraints, Callable[[Array], float]]]:
     """Return constraints, and by how much a state misses them.
 
     The hand looks down; a point 0.1 m below the flange stays in a box above 0.4 m; a joint stays
@@ -109,7 +104,7 @@ def cases() -> dict[str, tuple[Constraints, Callable[[Array], float]]]:
     level.absolute_x_axis_tolerance = level.absolute_y_axis_tolerance = 0.3
     level.absolute_z_axis_tolerance = math.pi
     vector = deepcopy(level)
-    vector.parameterization = OrientationConstraint.ROTATION_VECTOR
+    vector.parameterization = msg.OrientationConstraint.ROTATION_VECTOR
     place = pose_goal(pose_at(0.0, 0.0, 0.6), HAND, BASE).position_constraints[0]
     place.target_point_offset.z = 0.1
     slab = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[2.0, 2.0, 0.4])
@@ -128,14 +123,14 @@ def cases() -> dict[str, tuple[Constraints, Callable[[Array], float]]]:
 
     return {
         'euler angles': (
-            Constraints(orientation_constraints=[level]),
-            partial(tilted, OrientationConstraint.XYZ_EULER_ANGLES),
+            msg.Constraints(orientation_constraints=[level]),
+            partial(tilted, msg.OrientationConstraint.XYZ_EULER_ANGLES),
         ),
         'rotation vector': (
-            Constraints(orientation_constraints=[vector]),
-            partial(tilted, OrientationConstraint.ROTATION_VECTOR),
+            msg.Constraints(orientation_constraints=[vector]),
+            partial(tilted, msg.OrientationConstraint.ROTATION_VECTOR),
         ),
-        'region': (Constraints(position_constraints=[place]), outside),
+        'region': (msg.Constraints(position_constraints=[place]), outside),
         'joint': (joint, lambda at: float(max(at[3] + 1.85, -2.4 - at[3]))),
     }
 
@@ -143,7 +138,7 @@ def cases() -> dict[str, tuple[Constraints, Callable[[Array], float]]]:
 CASES = cases()
 
 
-def request(constraints: Constraints, goal: list[float]) -> MotionPlanRequest:
+def request(constraints: msg.Constraints, goal: list[float]) -> msg.MotionPlanRequest:
     """Return a request under path constraints."""
     asked = motion_request(joint_goal(goal), path_constraints=constraints)
     asked.allowed_planning_time = 60.0
@@ -159,9 +154,9 @@ def test_path_constraints_of_clients_hold_everywhere(rig: MoveGroupRig, case: st
     straight = np.linspace(START, GOAL, 50)
     assert case == 'joint' or max(beyond(each) for each in straight) > 0.05
     service = rig.plan(request(constraints, GOAL))
-    assert service.error_code.val == MoveItErrorCodes.SUCCESS, service.error_code
+    assert service.error_code.val == msg.MoveItErrorCodes.SUCCESS, service.error_code
     _status, action = rig.move(action_goal(request(constraints, GOAL), plan_only=True))
-    assert action.error_code.val == MoveItErrorCodes.SUCCESS, action.error_code
+    assert action.error_code.val == msg.MoveItErrorCodes.SUCCESS, action.error_code
     for trajectory in (service.trajectory, action.planned_trajectory):
         path = states(trajectory.joint_trajectory)
         assert max(beyond(each) for each in path) < 1e-6

@@ -13,12 +13,7 @@ from typing import Any
 
 from model_robots import two_arms_texts
 from move_group_rig import joint_goal
-from moveit_msgs.msg import (
-    AttachedCollisionObject,
-    MotionPlanRequest,
-    MotionSequenceItem,
-    PositionIKRequest,
-)
+from moveit_msgs import msg
 import numpy as np
 from planning_messages import QuietNode
 from planning_scenes import distances
@@ -40,9 +35,9 @@ STANDING = {'torso': 0.1, **ARMS}
 
 def item(group: str, radius: float = 0.0, planner: str = 'PTP', **goal: float) -> Any:
     """Return an item whose goal are joint positions in [rad]."""
-    request = MotionPlanRequest(group_name=group, planner_id=planner)
+    request = msg.MotionPlanRequest(group_name=group, planner_id=planner)
     request.goal_constraints = [joint_goal(list(goal.values()), list(goal))]
-    return MotionSequenceItem(req=request, blend_radius=radius)
+    return msg.MotionSequenceItem(req=request, blend_radius=radius)
 
 
 def with_start(first: Any, places: Mapping[str, float]) -> Any:
@@ -114,7 +109,7 @@ def test_a_cancel_ends_a_sequence_at_the_next_item(thread: PlanningThreads) -> N
 def test_what_is_refused(thread: PlanningThreads) -> None:
     """With the number of the item, before anything is planned."""
     attached = right(0.1)
-    attached.req.start_state.attached_collision_objects = [AttachedCollisionObject()]
+    attached.req.start_state.attached_collision_objects = [msg.AttachedCollisionObject()]
     for code, words, *items in (
         (PlanningCode.INVALID_MOTION_PLAN, 'item 0: blend radius -1', left(0.1, radius=-1.0)),
         (PlanningCode.INVALID_MOTION_PLAN, 'last item', left(0.1, radius=0.1)),
@@ -244,7 +239,7 @@ def test_inverse_kinematics_has_the_torso_where_it_is() -> None:
     for torso in (0.4, -0.7):
         here = robot().positions({'torso': torso})
         wanted = robot().kinematics.link_pose(link, moved(here, np.array([0.3, -0.5, 0.2])))
-        request = PositionIKRequest(group_name='left', ik_link_name=link)
+        request = msg.PositionIKRequest(group_name='left', ik_link_name=link)
         request.pose_stamped.pose = pose_message(wanted)
         _response, state = kinematics._ik(request, snapshot(), here)
         by_joint = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))

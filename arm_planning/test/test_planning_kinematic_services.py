@@ -16,11 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import chain_texts, ready, robot, ROBOTS
 from move_group_rig import HAND, JOINTS, MoveGroupRig, pose_goal, READY
-from moveit_msgs.msg import (
-    Constraints,
-    JointConstraint,
-    MoveItErrorCodes,
-)
+from moveit_msgs import msg
 import numpy as np
 from planning_messages import box, panda
 import pytest
@@ -115,7 +111,7 @@ def moved(*way: float) -> Pose:
 
 def solved(response: Any) -> Pose:
     """Return where the tip is in a solution."""
-    assert response.error_code.val == MoveItErrorCodes.SUCCESS, response.error_code
+    assert response.error_code.val == msg.MoveItErrorCodes.SUCCESS, response.error_code
     state = response.solution.joint_state
     assert set(state.name) == set(panda().joints)
     place = dict(zip(state.name, state.position, strict=True))
@@ -148,28 +144,28 @@ def test_collisions_are_avoided_where_that_is_asked(rig: MoveGroupRig) -> None:
     assert 'crate' in refused.message
 
 
-def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -> Constraints:
+def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -> msg.Constraints:
     """Return a constraint of a joint."""
-    limits = JointConstraint(joint_name=f'panda_joint{number}', position=position)
+    limits = msg.JointConstraint(joint_name=f'panda_joint{number}', position=position)
     limits.tolerance_above = limits.tolerance_below = tolerance
-    return Constraints(joint_constraints=[limits])
+    return msg.Constraints(joint_constraints=[limits])
 
 
-def region(y: float) -> Constraints:
+def region(y: float) -> msg.Constraints:
     """Return a constraint of the tip to a ball beside where it is."""
     place = pose_goal(pose_message(moved(0.0, y, 0.0)), HAND, BASE).position_constraints[0]
     place.constraint_region.primitives[0].dimensions = [0.02]
-    return Constraints(position_constraints=[place])
+    return msg.Constraints(position_constraints=[place])
 
 
-def turned(tolerance: float, x: float) -> Constraints:
+def turned(tolerance: float, x: float) -> msg.Constraints:
     """Return a constraint of the tip's orientation."""
     pose = PoseMessage()
     pose.orientation.x, pose.orientation.w = np.sin(0.5 * x), np.cos(0.5 * x)
     turn = pose_goal(pose, HAND, HAND).orientation_constraints[0]
     turn.absolute_x_axis_tolerance = tolerance
     turn.absolute_y_axis_tolerance = turn.absolute_z_axis_tolerance = 0.01
-    return Constraints(orientation_constraints=[turn])
+    return msg.Constraints(orientation_constraints=[turn])
 
 
 @pytest.mark.parametrize(
@@ -183,7 +179,7 @@ def turned(tolerance: float, x: float) -> Constraints:
     ids=['joint', 'place', 'orientation'],
 )
 def test_solutions_heed_constraints(
-    rig: MoveGroupRig, heeded: Constraints, violated: Constraints, words: str
+    rig: MoveGroupRig, heeded: msg.Constraints, violated: msg.Constraints, words: str
 ) -> None:
     """Of joints, places and orientations."""
     solved(rig.ik(pose_message(TIP), BASE, constraints=heeded))
@@ -252,7 +248,7 @@ def test_a_path_ends_in_front_of_what_it_must_not_touch(rig: MoveGroupRig) -> No
     rig.add(box('crate', *moved(0.0, 0.25, 0.0).position.tolist(), edge=0.1))
     assert path(rig, end).fraction == 1.0
     blocked = path(rig, end, avoid_collisions=True)
-    assert blocked.error_code.val == MoveItErrorCodes.SUCCESS
+    assert blocked.error_code.val == msg.MoveItErrorCodes.SUCCESS
     assert 0.0 < blocked.fraction < 1.0
     assert 'crate' in blocked.error_code.message
     _, tip = places_of(blocked)

@@ -22,18 +22,7 @@ from planning_scenes import (
 )
 import pytest
 
-from arm_model import (
-    Array,
-    Box,
-    Cylinder,
-    frozen,
-    inverse,
-    ORIGIN,
-    PlacedShape,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+import arm_model as am
 from arm_planning import (
     JointGoal,
     MotionRequest,
@@ -61,29 +50,32 @@ APART, AROUND = 1.0, 0.9
 """How far start and goal are apart at least, and from the ready pose at most, in [rad]."""
 
 
-def level(model: RobotModel, behind: float = 0.0) -> PathConstraints:
+def level(model: am.RobotModel, behind: float = 0.0) -> PathConstraints:
     """Keep a cup level: turned about its axis only, which is that of the tool at ready.
 
     Args:
         behind: How far about that axis it begins away, in [rad].
     """
     upright = model.pose(ready(model.name)).rotation
-    wanted = frozen(upright @ pin.exp3(np.array([0.0, 0.0, behind])))
-    turn = OrientationConstraint(model.tip, wanted, frozen([0.1, 0.1, FREE_TURN]))
+    wanted = am.frozen(upright @ pin.exp3(np.array([0.0, 0.0, behind])))
+    turn = OrientationConstraint(model.tip, wanted, am.frozen([0.1, 0.1, FREE_TURN]))
     return PathConstraints(orientations=[turn])
 
 
-def in_a_slab(model: RobotModel) -> PathConstraints:
+def in_a_slab(model: am.RobotModel) -> PathConstraints:
     """Keep a point before the tip at a height: in a flat box, or in a cylinder beside it."""
     pose = model.pose(ready(model.name))
-    offset = frozen([0.0, 0.0, 0.05])
-    place = Pose(ORIGIN.rotation, frozen(pose.position + pose.rotation @ offset))
-    low = Pose(ORIGIN.rotation, frozen(place.position - [0.0, 0.0, 5.0]))
-    regions = [PlacedShape(Box(4.0, 4.0, 0.08), place), PlacedShape(Cylinder(0.1, 0.1), low)]
+    offset = am.frozen([0.0, 0.0, 0.05])
+    place = am.Pose(am.ORIGIN.rotation, am.frozen(pose.position + pose.rotation @ offset))
+    low = am.Pose(am.ORIGIN.rotation, am.frozen(place.position - [0.0, 0.0, 5.0]))
+    regions = [
+        am.PlacedShape(am.Box(4.0, 4.0, 0.08), place),
+        am.PlacedShape(am.Cylinder(0.1, 0.1), low),
+    ]
     return PathConstraints(positions=[PositionConstraint(model.tip, offset, regions)])
 
 
-def by_joints(model: RobotModel) -> PathConstraints:
+def by_joints(model: am.RobotModel) -> PathConstraints:
     """Keep two joints near ready, and the cup level besides."""
     at = dict(zip(model.joints, ready(model.name).tolist(), strict=True))
     first, second = model.joints[:2]
@@ -91,7 +83,7 @@ def by_joints(model: RobotModel) -> PathConstraints:
     return replace(level(model), joints=joints)
 
 
-def broken(model: RobotModel, constraints: PathConstraints, state: Array) -> list[str]:
+def broken(model: am.RobotModel, constraints: PathConstraints, state: am.Array) -> list[str]:
     """Return which constraints of the tip a state breaks, by their definitions."""
     found = []
     pose = model.pose(state)
@@ -106,17 +98,17 @@ def broken(model: RobotModel, constraints: PathConstraints, state: Array) -> lis
             found.append(f'turned by {off}')
     for place in constraints.positions:
         point = pose.position + pose.rotation @ place.offset
-        local = [(each.shape, inverse(each.pose)) for each in place.regions]
+        local = [(each.shape, am.inverse(each.pose)) for each in place.regions]
         if not any(holds(s, p.position + p.rotation @ point, EDGE) for s, p in local):  # type: ignore[arg-type]
             found.append(f'{point} is in no region')
     return found
 
 
 def ends(
-    model: RobotModel, check: ConstraintCheck, planner: Planner, seed: int
-) -> tuple[Array, Array]:
+    model: am.RobotModel, check: ConstraintCheck, planner: Planner, seed: int
+) -> tuple[am.Array, am.Array]:
     """Return two states far apart that are valid and heed constraints."""
-    draw, found = np.random.default_rng(seed), list[Array]()
+    draw, found = np.random.default_rng(seed), list[am.Array]()
     scene = with_random_boxes(model, 5, seed)
     while len(found) < 2:
         drawn = ready(model.name) + draw.uniform(-AROUND, AROUND, len(model))
@@ -124,7 +116,7 @@ def ends(
         if state is None or planner.is_valid(state, scene) is not None:
             continue
         if not found or np.linalg.norm(state - found[0]) > APART:
-            found.append(frozen(state))
+            found.append(am.frozen(state))
     return found[0], found[1]
 
 
@@ -134,7 +126,7 @@ def ends(
 )
 @pytest.mark.parametrize('seed', SEEDS)
 def test_path_constraints_hold_everywhere(
-    name: str, constraints_of: Callable[[RobotModel], PathConstraints], seed: int
+    name: str, constraints_of: Callable[[am.RobotModel], PathConstraints], seed: int
 ) -> None:
     """In random scenes, looked at every milliradian; limits and distances hold as ever."""
     model = robot(name)
@@ -159,7 +151,7 @@ def test_a_pose_is_reached_by_a_solution_that_heeds_the_constraints() -> None:
     model = robot('gp110')
     start = ready('gp110')
     pose = model.pose(start)
-    aside = PoseGoal(Pose(pose.rotation, frozen(np.add(pose.position, [0.0, 0.3, 0.1]))))
+    aside = PoseGoal(am.Pose(pose.rotation, am.frozen(np.add(pose.position, [0.0, 0.3, 0.1]))))
     asked = MotionRequest(start, [aside], timeout=TIMEOUT, constraints=level(model))
     path = Planner(model).plan(asked).path
     assert ConstraintCheck(model, level(model)).path(path) is None
@@ -174,12 +166,12 @@ def test_a_goal_that_breaks_a_constraint_is_reached_where_its_tolerance_heeds_it
     model, start = robot('gp110'), ready('gp110')
     least = float(start[0]) - 0.3
     constraints = PathConstraints({model.joints[0]: (least, least + 2.0)})
-    places = frozen(start - 0.4 * np.eye(6)[0])
-    goal: JointGoal | PoseGoal = JointGoal(places, frozen([0.3] * 6))
+    places = am.frozen(start - 0.4 * np.eye(6)[0])
+    goal: JointGoal | PoseGoal = JointGoal(places, am.frozen([0.3] * 6))
     exact: JointGoal | PoseGoal = JointGoal(places)
     if by_pose:
         exact = PoseGoal(model.pose(places))
-        goal = replace(exact, tolerances=near(exact.pose, Sphere(1.0), frozen([0.5] * 3)))
+        goal = replace(exact, tolerances=near(exact.pose, am.Sphere(1.0), am.frozen([0.5] * 3)))
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
     assert path.positions(dense_times(path))[:, 0].min() >= least - 1e-9
@@ -196,12 +188,12 @@ def test_a_tilted_goal_is_reached_upright_where_its_tolerance_is_wide() -> None:
     """What is narrow in a wide tolerance is found by projection, not by chance."""
     model, start = robot('panda'), ready('panda')
     (turn,) = level(model).orientations
-    narrow = replace(turn, tolerance=frozen([0.02, 0.02, FREE_TURN]))
+    narrow = replace(turn, tolerance=am.frozen([0.02, 0.02, FREE_TURN]))
     constraints = PathConstraints(orientations=[narrow])
     pose = model.pose(start)
     tilted = pose.rotation @ pin.exp3(np.array([0.2, 0.0, 0.0]))
-    aside = Pose(frozen(tilted), frozen(np.add(pose.position, [0.0, 0.2, 0.0])))
-    tolerances = near(aside, Sphere(0.01), frozen([0.4] * 3))
+    aside = am.Pose(am.frozen(tilted), am.frozen(np.add(pose.position, [0.0, 0.2, 0.0])))
+    tolerances = near(aside, am.Sphere(0.01), am.frozen([0.4] * 3))
     goal = PoseGoal(aside, tolerances=tolerances)
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
@@ -214,10 +206,10 @@ def test_what_cannot_be_is_refused() -> None:
     """With the joint, and what to do; too narrow for free motion is not too narrow for LIN."""
     model, start = robot('panda'), ready('panda')
     pose = model.pose(start)
-    below = PoseGoal(Pose(pose.rotation, frozen(np.add(pose.position, [0.0, 0.0, -0.1]))))
-    turn = OrientationConstraint(model.tip, pose.rotation, frozen([1e-3] * 3))
+    below = PoseGoal(am.Pose(pose.rotation, am.frozen(np.add(pose.position, [0.0, 0.0, -0.1]))))
+    turn = OrientationConstraint(model.tip, pose.rotation, am.frozen([1e-3] * 3))
     narrow = PathConstraints(orientations=[turn])
-    aside = JointGoal(frozen(start + 0.5 * np.eye(7)[0]))
+    aside = JointGoal(am.frozen(start + 0.5 * np.eye(7)[0]))
     for goal, constraints, words in (
         (aside, PathConstraints({'panda_joint2': (-0.785, -0.784)}), '0.0010 wide'),
         (aside, PathConstraints({'panda_joint2': (0.5, -0.5)}), 'contradict'),

@@ -15,17 +15,7 @@ from typing import Any
 from geometry_msgs.msg import Point32
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moveit_msgs.msg import (
-    AttachedCollisionObject,
-    Constraints,
-    JointConstraint,
-    LinkPadding,
-    LinkScale,
-    ObjectColor,
-    PlanningScene,
-    RobotState,
-)
-from moveit_msgs.msg import CollisionObject as ObjectMessage
+from moveit_msgs import msg
 import numpy as np
 from planning_messages import (
     box,
@@ -63,10 +53,10 @@ from arm_trajectory import lines, Path
 def test_a_goal_has_the_tolerance_of_the_nearer_side() -> None:
     """The joints that it leaves out stay; those of which nothing is known are in their range."""
     model = panda().model('panda_arm')
-    message = JointConstraint(joint_name=model.joints[0], position=0.5)
+    message = msg.JointConstraint(joint_name=model.joints[0], position=0.5)
     message.tolerance_above, message.tolerance_below = 0.3, 0.01
     reader = RequestReader(model, SceneSnapshot(panda().scene), panda().positions({}))
-    goal = reader.goal(Constraints(joint_constraints=[message]))
+    goal = reader.goal(msg.Constraints(joint_constraints=[message]))
     assert isinstance(goal, JointGoal)
     assert goal.positions[0] == 0.5
     assert goal.tolerance[0] == pytest.approx(0.01)
@@ -117,7 +107,7 @@ class TickingNode(QuietNode):
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
         monkeypatch.setattr(f'{SceneMonitor.__module__}.time.monotonic', lambda: self.now)
-        self.published: list[PlanningScene] = []
+        self.published: list[msg.PlanningScene] = []
         self.warnings: list[str] = []
         self.receive: dict[str, Callable[[Any], None]] = {}
         self.tick: Callable[[], None] = lambda: None
@@ -139,7 +129,7 @@ class TickingNode(QuietNode):
 
     def get_clock(self) -> Any:
         """Return a clock that stands."""
-        stamp = PlanningScene().robot_state.joint_state.header.stamp
+        stamp = msg.PlanningScene().robot_state.joint_state.header.stamp
         return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: stamp))
 
     def get_logger(self) -> Any:
@@ -210,7 +200,7 @@ def test_whatever_a_scene_raises_refuses_that_scene_only(
     with monkeypatch.context() as broken:
         broken.setattr(scene_monitor, 'apply_scene', lambda *_: 1 // 0)
         for _ in range(3):
-            node.receive['planning_scene'](PlanningScene())
+            node.receive['planning_scene'](msg.PlanningScene())
     assert monitor.snapshot is before
     assert 'planning_scene refused: CRASH: ZeroDivisionError' in node.warnings[0]
     assert len(node.warnings) == 1  # a sensor may go on
@@ -224,14 +214,14 @@ NAMES = ['table', 'cup', 'panda_link1', 'panda_link5', 'tool']
 TIP = 'panda_link8'
 
 
-def edited(message: PlanningScene, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
+def edited(message: msg.PlanningScene, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
     """Return a scene after a message."""
     return apply_scene(snapshot, message, READY)
 
 
-def sent(snapshot: SceneSnapshot) -> PlanningScene:
+def sent(snapshot: SceneSnapshot) -> msg.PlanningScene:
     """Return a scene as a message."""
-    return scene_message(snapshot, panda().name, RobotState())
+    return scene_message(snapshot, panda().name, msg.RobotState())
 
 
 def with_objects(*messages: Any, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
@@ -259,21 +249,28 @@ def test_a_mesh_beside_a_prism_comes_back_as_it_was() -> None:
 @settings(deadline=None, max_examples=25)
 @given(first=objects('table'), second=objects('cup'), held=objects('tool'), data=st.data())
 def test_a_whole_scene_comes_back_as_it_was(
-    first: ObjectMessage, second: ObjectMessage, held: ObjectMessage, data: st.DataObject
+    first: msg.CollisionObject,
+    second: msg.CollisionObject,
+    held: msg.CollisionObject,
+    data: st.DataObject,
 ) -> None:
     """What get_planning_scene answers makes the same scene elsewhere.
 
     Objects have shapes, poses, planes, meshes with their triangles, subframes and type.
     """
-    message = PlanningScene(name='lab', link_padding=[LinkPadding(link_name=TIP, padding=0.0)])
-    message.link_padding.append(LinkPadding(link_name='panda_link5', padding=0.01))
-    message.link_scale = [LinkScale(link_name='panda_link5', scale=1.1)]
+    message = msg.PlanningScene(
+        name='lab', link_padding=[msg.LinkPadding(link_name=TIP, padding=0.0)]
+    )
+    message.link_padding.append(msg.LinkPadding(link_name='panda_link5', padding=0.01))
+    message.link_scale = [msg.LinkScale(link_name='panda_link5', scale=1.1)]
     message.world.collision_objects = [first, second]
-    message.object_colors = [ObjectColor(id='cup')]
+    message.object_colors = [msg.ObjectColor(id='cup')]
     message.object_colors[0].color.r = 0.5
     held.pose = data.draw(poses())
     message.robot_state.attached_collision_objects = [
-        AttachedCollisionObject(link_name=TIP, object=held, touch_links=['panda_hand'], weight=0.5)
+        msg.AttachedCollisionObject(
+            link_name=TIP, object=held, touch_links=['panda_hand'], weight=0.5
+        )
     ]
     once = edited(message)
     first_sent = sent(once)
@@ -291,12 +288,12 @@ def test_a_whole_scene_comes_back_as_it_was(
 @settings(deadline=None, max_examples=20)
 @given(thing=objects('thing'), held=objects('held'))
 def test_controllers_make_the_scene_that_the_planner_has(
-    thing: ObjectMessage, held: ObjectMessage
+    thing: msg.CollisionObject, held: msg.CollisionObject
 ) -> None:
     """Of what is published for them; objects with meshes, attached ones too."""
-    message = PlanningScene(link_padding=[LinkPadding(link_name=TIP, padding=0.01)])
+    message = msg.PlanningScene(link_padding=[msg.LinkPadding(link_name=TIP, padding=0.01)])
     message.world.collision_objects = [thing]
-    body = AttachedCollisionObject(link_name=TIP, object=held)
+    body = msg.AttachedCollisionObject(link_name=TIP, object=held)
     message.robot_state.attached_collision_objects = [body]
     planned = edited(message)
     received = collision_message(planned, panda().name)

@@ -16,23 +16,7 @@ from planning_messages import panda
 from planning_scenes import DENSE, distances, holds, with_box, with_random_boxes
 import pytest
 
-from arm_model import (
-    Array,
-    Box,
-    CollisionObject,
-    Cone,
-    Cylinder,
-    frozen,
-    Mesh,
-    ORIGIN,
-    PlacedShape,
-    Plane,
-    PlanningScene,
-    Pose,
-    RobotModel,
-    RobotState,
-    Sphere,
-)
+import arm_model as am
 from arm_planning import (
     OrientationConstraint,
     Parameterization,
@@ -45,10 +29,10 @@ from arm_planning.validity import MARGIN
 from arm_trajectory import build_path, GoalPoint, GoalRules, Path, TrajectoryGoal
 
 MODEL = panda().model('panda_arm')
-READY = frozen([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+READY = am.frozen([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
 LINK = 'panda_link8'
 TIP = MODEL.kinematics.link_pose(LINK, READY)
-SHAPES = (Box(0.1, 0.2, 0.3), Sphere(0.1), Cylinder(0.1, 0.3), Cone(0.1, 0.3))
+SHAPES = (am.Box(0.1, 0.2, 0.3), am.Sphere(0.1), am.Cylinder(0.1, 0.3), am.Cone(0.1, 0.3))
 AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda axis: axis @ axis > 0.01)
 ANGLES = st.tuples(*(st.floats(-most, most) for most in (3.1, 1.3, 3.1))).map(np.array)
 OFFSETS = st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array)
@@ -63,19 +47,19 @@ def results(constraints: PathConstraints) -> list[ConstraintResult]:
     return found
 
 
-def about(axis: int, angle: float) -> Array:
+def about(axis: int, angle: float) -> am.Array:
     """Return a turn about one axis."""
     return np.asarray(pin.exp3(angle * np.eye(3)[axis]))
 
 
-def region(shape: Box | Sphere | Cylinder | Cone, offset: Array) -> PlacedShape:
+def region(shape: am.Box | am.Sphere | am.Cylinder | am.Cone, offset: am.Array) -> am.PlacedShape:
     """Return a region whose middle is beside the tip."""
-    return PlacedShape(shape, Pose(ORIGIN.rotation, frozen(TIP.position + offset)))
+    return am.PlacedShape(shape, am.Pose(am.ORIGIN.rotation, am.frozen(TIP.position + offset)))
 
 
-def at_tip(*regions: PlacedShape) -> PathConstraints:
+def at_tip(*regions: am.PlacedShape) -> PathConstraints:
     """Return that the tip is in one of some regions."""
-    return PathConstraints(positions=[PositionConstraint(LINK, frozen(np.zeros(3)), regions)])
+    return PathConstraints(positions=[PositionConstraint(LINK, am.frozen(np.zeros(3)), regions)])
 
 
 def test_each_constraint_has_its_result() -> None:
@@ -83,12 +67,12 @@ def test_each_constraint_has_its_result() -> None:
 
     A link may be in any of its regions: as in MoveIt, the primitives are a union.
     """
-    near, far = (region(Sphere(0.05), np.array([x, 0.0, 0.0])) for x in (0.0, 0.2))
-    tight = frozen([0.1, 0.1, 0.1])
+    near, far = (region(am.Sphere(0.05), np.array([x, 0.0, 0.0])) for x in (0.0, 0.2))
+    tight = am.frozen([0.1, 0.1, 0.1])
     joint, other, turn, place = results(
         PathConstraints(
             {'panda_joint1': (0.3, 0.5), 'panda_joint2': (-1.0, 0.0)},
-            [OrientationConstraint(LINK, frozen(TIP.rotation @ about(2, np.pi / 2)), tight)],
+            [OrientationConstraint(LINK, am.frozen(TIP.rotation @ about(2, np.pi / 2)), tight)],
             at_tip(far).positions,
         )
     )
@@ -104,7 +88,7 @@ def test_each_constraint_has_its_result() -> None:
 
 @given(st.sampled_from(SHAPES), OFFSETS)
 def test_a_region_holds_what_is_inside(
-    shape: Box | Sphere | Cylinder | Cone, offset: Array
+    shape: am.Box | am.Sphere | am.Cylinder | am.Cone, offset: am.Array
 ) -> None:
     """By the definition of each shape, but for rounding at its faces."""
     (result,) = results(at_tip(region(shape, offset)))
@@ -117,7 +101,7 @@ def test_a_region_holds_what_is_inside(
 @pytest.mark.parametrize('parameterization', Parameterization)
 @given(ANGLES, AXES, AXES)
 def test_angles_of_a_link_are_those_of_moveit_and_change_as_their_rows_say(
-    parameterization: Parameterization, angles: Array, wanted: Array, turn: Array
+    parameterization: Parameterization, angles: am.Array, wanted: am.Array, turn: am.Array
 ) -> None:
     """About x, then the new y, then the new z, or a vector, to nearly half a turn.
 
@@ -125,7 +109,7 @@ def test_angles_of_a_link_are_those_of_moveit_and_change_as_their_rows_say(
     """
     turned_by = pin.exp3(wanted)
     constraint = OrientationConstraint(
-        LINK, frozen(turned_by), frozen(np.ones(3)), parameterization
+        LINK, am.frozen(turned_by), am.frozen(np.ones(3)), parameterization
     )
     if parameterization is Parameterization.XYZ_EULER_ANGLES:
         rotation = turned_by @ about(0, angles[0]) @ about(1, angles[1]) @ about(2, angles[2])
@@ -134,8 +118,8 @@ def test_angles_of_a_link_are_those_of_moveit_and_change_as_their_rows_say(
         rotation = turned_by @ pin.exp3(angles)
     by_turn = np.vstack((np.zeros((3, 3)), np.eye(3)))
 
-    def row(turn: Array) -> Any:
-        pose = Pose(frozen(pin.exp3(turn) @ rotation), TIP.position)
+    def row(turn: am.Array) -> Any:
+        pose = am.Pose(am.frozen(pin.exp3(turn) @ rotation), TIP.position)
         return _turned(constraint, pose, by_turn)[0]
 
     here, turn = row(np.zeros(3)), turn / np.linalg.norm(turn)
@@ -152,8 +136,8 @@ def test_angles_of_a_link_are_those_of_moveit_and_change_as_their_rows_say(
 @pytest.mark.parametrize('parameterization', Parameterization)
 def test_an_angle_of_half_a_turn_is_any_angle(parameterization: Parameterization) -> None:
     """Also where the angle jumps from one side to the other."""
-    rotation = frozen(TIP.rotation @ about(2, np.pi - 1e-4))
-    turn = OrientationConstraint(LINK, rotation, frozen([0.1, 0.1, np.pi]), parameterization)
+    rotation = am.frozen(TIP.rotation @ about(2, np.pi - 1e-4))
+    turn = OrientationConstraint(LINK, rotation, am.frozen([0.1, 0.1, np.pi]), parameterization)
     assert ConstraintCheck(MODEL, PathConstraints(orientations=[turn])).heeds(READY)
 
 
@@ -161,7 +145,7 @@ THIN = 0.002  # thickness of a sheet in [m], which coarse sampling would pass th
 NEAR = 0.0005  # distance of an arm that nearly touches in [m]
 MOTIONS = 40  # straight motions that are compared with a dense sampler in each scene
 TOUCH = 1e-3  # how deep a wire is touched in [m]
-SWING = [frozen(ready('panda') + turn * np.eye(7)[0]) for turn in (-0.8, 0.8)]
+SWING = [am.frozen(ready('panda') + turn * np.eye(7)[0]) for turn in (-0.8, 0.8)]
 
 
 @pytest.mark.parametrize('seed', range(8))
@@ -185,10 +169,10 @@ CART = (
 """A ball on a rail: its distance rate bound is exact, a straight line has no reserve."""
 
 
-def path_to(model: RobotModel, begin: Array, end: Array) -> Path:
+def path_to(model: am.RobotModel, begin: am.Array, end: am.Array) -> Path:
     """Return a straight motion of four seconds."""
     goal = TrajectoryGoal(model.joints, [GoalPoint(4.0, end.tolist())])
-    return build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path
+    return build_path(goal, model.limits, am.RobotState.at_rest(begin), GoalRules()).path
 
 
 @pytest.mark.parametrize('at', np.linspace(-0.93, 0.95, 12).tolist())
@@ -196,11 +180,11 @@ def test_a_pin_beside_the_rail_is_not_passed(at: float) -> None:
     """It overlaps by half a millimetre, wherever it stands; a second pin is near elsewhere."""
     group = '<group name="arm"><chain base_link="base" tip_link="cart"/></group>'
     limits = {'x': {'max_acceleration': 2.0, 'max_jerk': 20.0}}
-    model = RobotModel(CART, f'<robot name="cart">{group}</robot>', limits)
+    model = am.RobotModel(CART, f'<robot name="cart">{group}</robot>', limits)
     scene = model.scene
     for name, place in (('pin', (at, 0.0, 0.0015)), ('other', (-at, 0.02, 0.0))):
-        pose = Pose(ORIGIN.rotation, frozen(place))
-        scene = scene.with_object(CollisionObject(name, Sphere(0.001), pose=pose))
+        pose = am.Pose(am.ORIGIN.rotation, am.frozen(place))
+        scene = scene.with_object(am.CollisionObject(name, am.Sphere(0.001), pose=pose))
     check, ends = ValidityCheck(model.limits, scene), np.array([[-1.0], [1.0]])
     assert check.waypoints(ends) is not None
     assert check.path(path_to(model, *ends)) is not None
@@ -239,30 +223,32 @@ def test_a_path_between_states_in_near_contact_is_found_valid() -> None:
     assert ValidityCheck(model.limits, scene).waypoints(np.array((here, away))) is None
 
 
-def scenes() -> dict[str, PlanningScene]:
+def scenes() -> dict[str, am.PlanningScene]:
     """Return the Panda over a half-space, beside a mesh, and with a box in its hand."""
     model, draw = robot('panda'), np.random.default_rng(1)
     points = draw.uniform(-0.2, 0.2, (30, 3)) + np.array((0.5, 0.0, 0.5))
-    rock, ground = CollisionObject('rock', Mesh(points)), Plane(offset=-0.05)
+    rock, ground = am.CollisionObject('rock', am.Mesh(points)), am.Plane(offset=-0.05)
     below = model.pose(ready('panda')).position - np.array((0.0, 0.0, 0.1))
     loaded = with_box(
         with_random_boxes(model, 4, 3), 'load', (0.1, 0.1, 0.2), tuple(below.tolist())
     )
     return {
-        'plane': model.scene.with_object(CollisionObject('ground', ground)),  # no box about it
+        'plane': model.scene.with_object(am.CollisionObject('ground', ground)),  # no box about it
         'hull': model.scene.with_object(rock),
         'carried': loaded.attached('load', model.tip, ready('panda'), touch_links=['panda_hand']),
     }
 
 
-def deepest_on(begin: Array, end: Array, scene: PlanningScene) -> float:
+def deepest_on(begin: am.Array, end: am.Array, scene: am.PlanningScene) -> float:
     """Return the least distance on a straight motion in [m], as a dense sampler finds it."""
     count = math.ceil(float(np.abs(end - begin).max()) / DENSE)
     return float(distances(scene, np.linspace(begin, end, count)).min())
 
 
 @pytest.mark.parametrize('scene', scenes().values(), ids=scenes())
-def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(scene: PlanningScene) -> None:
+def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(
+    scene: am.PlanningScene,
+) -> None:
     """Nothing passes that touches between two looks, and nothing is refused that has room."""
     check = ValidityCheck(robot('panda').limits, scene)
     required = check.required(ready('panda'))
