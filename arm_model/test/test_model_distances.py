@@ -163,34 +163,6 @@ def agrees_with_coal(scene: am.PlanningScene, seed: int) -> None:
         assert core(scene).clear(place, within) == bool((found >= within).all())
 
 
-@pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110', 'crowd'])
-def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
-    """And what is not keeps less than it must, where the core says."""
-    if name == 'crowd':
-        model, scene, edges, looks = robot('panda'), crowd(1), 20, 40
-    else:
-        box, there = am.Box(0.2, 0.5, 0.5), am.Pose(np.eye(3), np.array([0.6, 0.0, 0.4]))
-        model, scene, edges, looks = robot(name), scene_with(box, there, name), 60, 200
-    draw = np.random.default_rng(1)
-    checked, reference = core(scene), am.Clearances(scene)
-    required = np.full(len(scene.pairs), 1e-3)
-    answers: list[bool] = []
-    while len(answers) < edges:
-        begin = draw.uniform(model.limits.lower, model.limits.upper)
-        if not checked.clear(begin, 1e-3):
-            continue
-        end = begin + draw.normal(size=len(begin)) * 0.3
-        share = checked.edge(begin, end, required)
-        if share is None:
-            for place in np.linspace(begin, end, looks):
-                assert reference.least(place, 0.0).min() >= 0.0
-        else:
-            place = begin + share * (end - begin)
-            assert reference.least(place, 1e-2).min() <= 1e-3 + ROUNDING
-        answers.append(share is None)
-    assert 0.1 < np.mean(answers) < 0.99
-
-
 @pytest.mark.parametrize(('link', 'moves'), [('panda_link8', True), ('panda_link0', False)])
 def test_an_attached_octree_is_solid(link: str, *, moves: bool) -> None:
     """Also where it moves with its link: then coal measures, instead of the compiled core."""

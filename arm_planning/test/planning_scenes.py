@@ -96,8 +96,14 @@ def deepest_overlap(path: Path, scene: am.PlanningScene) -> float:
     return float(distances(scene, path.positions(dense_times(path))).min(initial=np.inf))
 
 
-def broken_limits(path: Path, limits: am.JointLimits) -> list[str]:
-    """Return what exceeds a limit on a path, looked at from its values alone."""
+def broken_limits(
+    path: Path, limits: am.JointLimits, tolerance: float = RATE_TOLERANCE
+) -> list[str]:
+    """Return what exceeds a limit on a path, looked at from its values alone.
+
+    Args:
+        tolerance: Share by which a rate may exceed its limit.
+    """
     segments = np.repeat(np.arange(len(path.durations)), 200)
     shares = np.tile(np.linspace(0.0, 1.0, 200), len(path.durations))
     offsets = shares * path.durations[segments]
@@ -107,6 +113,6 @@ def broken_limits(path: Path, limits: am.JointLimits) -> list[str]:
         broken.append('position')
     for order, name in enumerate(('velocity', 'acceleration', 'jerk'), start=1):
         most = np.abs(path.derived(order, segments, offsets)).max(axis=0)
-        if (most > getattr(limits, name) * (1.0 + RATE_TOLERANCE)).any():
+        if (most > getattr(limits, name) * (1.0 + tolerance)).any():
             broken.append(name)
     return broken

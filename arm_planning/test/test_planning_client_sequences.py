@@ -366,6 +366,9 @@ def test_goals_and_path_constraints_of_what_is_held(
         goal.orientation_constraints = []
     _status, moved = rig.move(action_goal(request))
     assert moved.error_code.val == SUCCESS, moved.error_code
+    for point in moved.planned_trajectory.joint_trajectory.points:
+        off = place_of(list(point.positions)).position - begin.position
+        assert (np.abs(off) <= [0.02 + 1e-6, 0.1 + 1e-6, 0.15 + 1e-6]).all()
     way = (place_of(at(rig)).position - begin.position).tolist()
     assert way == pytest.approx([0.0, 0.06, 0.08], abs=1e-3)
     if turned:

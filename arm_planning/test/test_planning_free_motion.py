@@ -96,17 +96,6 @@ def at_a_pillar() -> tuple[RobotModel, PlanningScene, Array, Array]:
     return model, scene, turned(-0.8), turned(0.8)
 
 
-def test_an_obstacle_is_gone_around() -> None:
-    """The straight motion is blocked, and the plan is longer, but there."""
-    model, scene, start, goal = at_a_pillar()
-    planner = Planner(model)
-    alone = planner.plan(request(start, goal))
-    around = planner.plan(request(start, goal), scene)
-    assert deepest_overlap(alone.path, scene) < 0.0
-    assert deepest_overlap(around.path, scene) > -OVERLAP_TOLERANCE
-    assert around.path.duration > alone.path.duration
-
-
 def around_a_pillar(
     seed: int, expired: Callable[[], bool] = lambda: False, *, far: float | None = None
 ) -> Path:
@@ -217,19 +206,6 @@ def test_requests_that_make_no_sense_are_refused(planner_id: str) -> None:
         assert words in str(refusal(planner, replace(asked, **fields)))
     if planner_id != 'LIN':  # a link without a speed limit has no effect
         assert planner.plan(replace(asked, cartesian_speed_link='moon')).path.duration
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-def test_a_pose_is_reached_by_a_free_motion(name: str) -> None:
-    """By a solution of inverse kinematics that is free of contact."""
-    model, planner = robot(name), Planner(robot(name))
-    wanted = ready(name) + 0.3
-    goal = PoseGoal(planner.fk(wanted))
-    plan = planner.plan(MotionRequest(ready(name), [goal], timeout=TIMEOUT))
-    reached = planner.fk(plan.path.end.position)
-    assert np.allclose(reached.position, goal.pose.position, atol=1e-5)
-    assert np.allclose(reached.rotation, goal.pose.rotation, atol=1e-5)
-    assert deepest_overlap(plan.path, model.scene) > -OVERLAP_TOLERANCE
 
 
 @pytest.mark.parametrize('name', ROBOTS)

@@ -27,6 +27,7 @@ from arm_planning import (
     JointGoal,
     MotionRequest,
     OrientationConstraint,
+    Parameterization,
     PathConstraints,
     Planner,
     PlanningCode,
@@ -76,11 +77,13 @@ def in_a_slab(model: am.RobotModel) -> PathConstraints:
 
 
 def by_joints(model: am.RobotModel) -> PathConstraints:
-    """Keep two joints near ready, and the cup level besides."""
+    """Keep two joints near ready, and the cup level besides, by its Euler angles."""
     at = dict(zip(model.joints, ready(model.name).tolist(), strict=True))
     first, second = model.joints[:2]
     joints = {name: (at[name] - 0.4, at[name] + 0.3) for name in (first, second)}
-    return replace(level(model), joints=joints)
+    (turn,) = level(model).orientations
+    euler = replace(turn, parameterization=Parameterization.XYZ_EULER_ANGLES)
+    return PathConstraints(joints, [euler])
 
 
 def broken(model: am.RobotModel, constraints: PathConstraints, state: am.Array) -> list[str]:
@@ -92,8 +95,10 @@ def broken(model: am.RobotModel, constraints: PathConstraints, state: am.Array) 
         if not lower - EDGE <= at[name] <= upper + EDGE:
             found.append(f'{name} at {at[name]}')
     for turn in constraints.orientations:
-        turned = pin.AngleAxis(turn.rotation.T @ pose.rotation)
-        off = turned.angle * turned.axis
+        off = pin.log3(turn.rotation.T @ pose.rotation)
+        if turn.parameterization is Parameterization.XYZ_EULER_ANGLES:
+            (_, _, y), (_, _, x), (_, _, w) = (turn.rotation.T @ pose.rotation).tolist()
+            off = np.array([np.arctan2(-x, w), np.arcsin(np.clip(y, -1.0, 1.0)), 0.0])
         if (np.abs(off) > turn.tolerance + EDGE).any():
             found.append(f'turned by {off}')
     for place in constraints.positions:

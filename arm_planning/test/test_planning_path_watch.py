@@ -21,7 +21,7 @@ from arm_planning.nodes.move_group import contact_ahead, passed_time, PathWatch
 from arm_planning.ros.execution import Execution, INVALIDATED
 from arm_planning.ros.scene import SceneSnapshot
 from arm_planning.ros.scene_changes import apply_scene
-from arm_planning.ros.trajectories import from_start, path_of, trajectory_message
+from arm_planning.ros.trajectories import from_start, trajectory_message
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
 MODEL = panda().model('panda_arm')
@@ -50,18 +50,6 @@ def crate_at(share: float) -> Any:
     """Return the scene with a crate where the tip is at a share of the turn."""
     x, y, z = MODEL.kinematics.link_pose('panda_link8', frozen(READY + share * TURN)).position
     return apply_scene(EMPTY, scene_change(box('crate', x, y, z, edge=0.1)), places(READY)).scene
-
-
-@pytest.mark.parametrize('kinds', ['va', 'v', ''])
-def test_a_trajectory_is_read_as_controllers_follow_it(kinds: str) -> None:
-    """With accelerations exactly; positions alone are met at the points."""
-    path = path_of(motion(kinds))
-    times = np.linspace(0.0, PATH.duration, 50)
-    if kinds == 'va':
-        assert path.positions(times) == pytest.approx(PATH.positions(times), abs=1e-6)
-    assert path.positions(PATH.starts) == pytest.approx(PATH.positions(PATH.starts), abs=1e-6)
-    if kinds:
-        assert path.at(PATH.starts[0]).velocity == pytest.approx(np.zeros(7), abs=1e-6)
 
 
 def test_an_object_ahead_is_seen_and_one_behind_is_not() -> None:

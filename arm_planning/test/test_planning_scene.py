@@ -12,9 +12,11 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-from geometry_msgs.msg import Point32
+from geometry_msgs.msg import Point, Point32, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from move_group_rig import joint_goal, pose_goal
 from moveit_msgs import msg
 import numpy as np
 from planning_messages import (
@@ -34,7 +36,7 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_model import AllowedCollisionMatrix, Clearances, ModelError
 from arm_model.ros import allowed_collisions, apply_planning_scene, scene_change, seconds
-from arm_planning import JointGoal, PlanningCode, PlanningError
+from arm_planning import JointGoal, Parameterization, PlanningCode, PlanningError
 from arm_planning.ros import scene_monitor
 from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.robot_groups import RobotGroups
@@ -64,6 +66,35 @@ def test_a_goal_has_the_tolerance_of_the_nearer_side() -> None:
     assert (goal.positions <= model.limits.upper).all()
 
 
+def test_path_constraints_are_those_that_clients_mean() -> None:
+    """In the frames of links; a point beside the link; the sides of a joint's range differ."""
+    model, frame = panda().model('panda_arm'), 'panda_link4'
+    quarter = Quaternion(x=math.sqrt(0.5), w=math.sqrt(0.5))
+    pose = PoseMessage(position=Point(x=0.1, y=0.2, z=0.3), orientation=quarter)
+    wanted = pose_goal(pose, TIP, frame)
+    (place,), (turn,) = wanted.position_constraints, wanted.orientation_constraints
+    place.target_point_offset.z, turn.absolute_x_axis_tolerance = 0.1, 0.3
+    wanted.joint_constraints = joint_goal(
+        [-2.2], [frame.replace('link', 'joint')]
+    ).joint_constraints
+    wanted.joint_constraints[0].tolerance_above = 0.35
+    wanted.joint_constraints[0].tolerance_below = 0.2
+    reader, link = RequestReader(model, EMPTY, READY), panda().kinematics.link_pose(frame, READY)
+    for kind in Parameterization:
+        turn.parameterization = int(kind)
+        found = reader.constraints(wanted)
+        assert found is not None
+        assert found.joints == {'panda_joint4': pytest.approx((-2.4, -1.85))}
+        (point,), (held,) = found.positions, found.orientations
+        assert (point.link, held.link, held.parameterization) == (TIP, TIP, kind)
+        assert point.offset.tolist() == [0.0, 0.0, 0.1]
+        there = link.position + link.rotation @ [0.1, 0.2, 0.3]
+        assert point.regions[0].pose.position == pytest.approx(there)
+        about_x = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+        assert held.rotation == pytest.approx(link.rotation @ about_x)
+        assert held.tolerance.tolist() == [0.3, 1e-3, 1e-3]
+
+
 @given(st.lists(st.one_of(st.floats(1e-12, 1e-8), st.floats(1e-4, 2.0)), min_size=1, max_size=8))
 def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> None:
     """A phase of a motion may be shorter than a nanosecond; the ends are where they are."""
@@ -80,16 +111,25 @@ def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> No
 
 
 def test_points_of_a_path_are_near_to_each_other_and_make_it() -> None:
-    """Viewers show one after the other; what interpolates them with quintics has the path."""
+    """Viewers show one after the other; what interpolates them has the path.
+
+    With accelerations exactly; positions alone are met at the points.
+    """
     random = np.random.default_rng(0)
     for duration in (0.05, 0.73, 2.0):
         path = Path(np.array([duration]), random.uniform(-1.0, 1.0, (1, 6, 3)))
         trajectory = trajectory_message(['a', 'b', 'c'], path, 'base').joint_trajectory
         times = [seconds(point.time_from_start) for point in trajectory.points]
         assert np.diff(times).max() <= 0.1 + 1e-9
-        again = path_of(trajectory)
         looks = np.linspace(0.0, path.duration, 500)
-        assert again.positions(looks) == pytest.approx(path.positions(looks), abs=1e-6)
+        assert path_of(trajectory).positions(looks) == pytest.approx(
+            path.positions(looks), abs=1e-6
+        )
+        for field in ('accelerations', 'velocities'):
+            for point in trajectory.points:
+                setattr(point, field, [])
+            met = path_of(trajectory).positions(np.array(times))
+            assert met == pytest.approx(path.positions(np.array(times)), abs=1e-6)
 
 
 def test_a_robot_without_groups_is_refused() -> None:
