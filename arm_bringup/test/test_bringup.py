@@ -24,47 +24,29 @@ from process_supervisor import RosOptions
 DRIVES, MODE = ['shoulder', 'elbow'], 'cyclic_position_mode'
 
 
-def test_an_enabled_arm_is_jogged_and_follows_trajectories() -> None:
-    """In its namespace; nothing is enabled by hand."""
-    controllers = ['arm_controller', 'hand_controller']
-    ros = RosOptions('left')
-    text = next_commands(DRIVES, MODE, controllers, ros, enabled=True, simulated=False)
-    assert text.splitlines() == [
-        'in a second terminal:',
-        '    ros2 run arm_servo servo_keyboard_input --ros-args -r __ns:=/left',
-        '    ros2 action info /left/arm_controller/follow_joint_trajectory',
-        '    ros2 action info /left/hand_controller/follow_joint_trajectory',
-        '    ros2 topic echo --once /left/joint_states',
-    ]
+def test_what_comes_next_is_proposed() -> None:
+    """In its namespace; nothing is enabled by hand, or the services of each drive come first.
 
-
-def test_drives_that_are_not_enabled_are_enabled_first() -> None:
-    """By the services of each, or the option that is named; move_group comes last."""
-    text = next_commands(
-        DRIVES, MODE, ['arm_controller'], RosOptions(), enabled=False, simulated=True, planned=True
-    )
-    assert text.splitlines() == [
-        'in a second terminal (--enable enables all drives at the start):',
-        *(
-            f'    ros2 service call /shoulder/{service} std_srvs/srv/Trigger # and of the others'
-            for service in ('init', MODE)
-        ),
-        '    ros2 run arm_servo servo_keyboard_input',
-        '    ros2 action info /arm_controller/follow_joint_trajectory',
-        '    ros2 action info /move_action',
-        '    ros2 topic echo --once /joint_states',
-    ]
-
-
-def test_drives_alone_get_a_target_in_simulation_only() -> None:
-    """It is absolute, so no arm on hardware gets one proposed."""
-    simulated, real = (
-        next_commands(['axis'], MODE, [], RosOptions(), enabled=True, simulated=each)
-        for each in (True, False)
-    )
-    assert 'ros2 service call /axis/target canopen_interfaces/srv/COTargetDouble' in simulated
-    assert '{ target: 0.1 }' in simulated
-    assert real.splitlines()[1:] == ['    ros2 topic echo --once /joint_states']
+    A target is absolute, so no arm on hardware gets one proposed.
+    """
+    arm, none = ['arm_controller'], list[str]()
+    first = '    ros2 service call /shoulder/init std_srvs/srv/Trigger # and of the others'
+    target = 'ros2 service call /shoulder/target canopen_interfaces/srv/COTargetDouble'
+    for lines, controllers, namespace, enabled, simulated, planned in (
+        ({'/left/arm_controller/follow_joint_trajectory', '-r __ns:=/left'}, arm, 'left', 1, 0, 0),
+        ({first, '--enable enables', '/move_action', 'servo_keyboard_input'}, arm, '', 0, 1, 1),
+        ({target, '{ target: 0.1 }', '/joint_states'}, none, '', 1, 1, 0),
+        ({'echo --once /joint_states'}, none, '', 1, 0, 0),
+    ):
+        ros = RosOptions(namespace)
+        fields = {'simulated': bool(simulated), 'planned': bool(planned)}
+        text = next_commands(DRIVES, MODE, controllers, ros, enabled=bool(enabled), **fields)
+        assert text.startswith('in a second terminal')
+        assert {line for line in lines if line not in text} == set(), text
+        assert ('/init' in text) == (not enabled)
+        assert ('/target' in text) == (simulated and not controllers)
+        assert ('servo_keyboard' in text) == bool(controllers)
+        assert ('/move_action' in text) == bool(planned)
 
 
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 import os
 from pathlib import Path
 import re
@@ -129,31 +128,6 @@ def test_the_tip_of_robot_yaml_is_that_of_its_main_group(folder: Path, tmp_path:
         assert locate(parse([f'{place}{os.sep}', *argv])[0]).tip_link == tip, (place, argv)
 
 
-def test_an_arm_that_is_named_as_an_end_effector_is_an_arm(tmp_path: Path) -> None:
-    """SRDFs of other planners do so; the gripper stays one."""
-    folder = write_two_arms(tmp_path / 'two_arms')
-    file = folder / 'two_arms.srdf'
-    own = '<end_effector name="tool" parent_link="left_roll_link" group="left"/></robot>'
-    file.write_text(file.read_text().replace('</robot>', own))
-    assert moved_groups(found(folder)) == MovedGroups(('left', 'right'), ('hand',))
-
-
-@pytest.mark.parametrize(
-    ('argv', 'waving'),
-    [
-        ([], DRIVES),
-        (['--group', 'right'], ARMS['right']),
-        (['--group', 'right', '--group', 'hand'], (*ARMS['right'], GRIPPER)),
-    ],
-)
-def test_groups_that_are_asked_for_wave(
-    tmp_path: Path, argv: Sequence[str], waving: Collection[str]
-) -> None:
-    """The demo enables the others as little as it waves with them."""
-    place = f'{write_two_arms(tmp_path / "two_arms")}{os.sep}'
-    assert {*waving_joints(locate(parse([place, *argv])[0]), DRIVES, DRIVES)} == {*waving}
-
-
 def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_path: Path) -> None:
     """For ``$(find ...)`` in xacro files, and for the meshes of the description."""
     shared = tmp_path / 'share' / 'vendor_description'
@@ -266,21 +240,36 @@ def test_all_arms_and_tools_with_drives_are_moved(folder: Path) -> None:
         assert groups(folder, drives, settings) == moved, (drives, settings)
 
 
-@pytest.mark.parametrize(
-    ('drives', 'settings', 'words'),
-    [
+def test_groups_that_cannot_be_moved_are_reported(folder: Path) -> None:
+    """With those that there are, and where one is chosen."""
+    for drives, settings, words in (
         ('abc', 'group: bath', r'no group bath; groups: left, .*group in robot.yaml, or --group'),
         ('abc', 'group: wide', 'no drive for d of group wide'),
         ('abcd', 'group: [left, wide]', 'group wide shares joints with left'),
         ('d', '', 'no group of arm.srdf has a drive for each joint'),
-    ],
-)
-def test_groups_that_cannot_be_moved_are_reported(
-    folder: Path, drives: str, settings: str, words: str
-) -> None:
-    """With those that there are, and where one is chosen."""
-    with pytest.raises(RobotError, match=words):
-        groups(folder, drives, settings)
+    ):
+        with pytest.raises(RobotError, match=words):
+            groups(folder, drives, settings)
+
+
+def test_groups_that_are_asked_for_wave(tmp_path: Path) -> None:
+    """The demo enables the others as little as it waves with them.
+
+    SRDFs of other planners name an arm as an end effector; the gripper stays one.
+    """
+    folder = write_two_arms(tmp_path / 'two_arms')
+    file = folder / 'two_arms.srdf'
+    own = '<end_effector name="tool" parent_link="left_roll_link" group="left"/></robot>'
+    file.write_text(file.read_text().replace('</robot>', own))
+    assert moved_groups(found(folder)) == MovedGroups(('left', 'right'), ('hand',))
+    right = ['--group', 'right']
+    for argv, waving in (
+        ([], DRIVES),
+        (right, ARMS['right']),
+        ([*right, '--group', 'hand'], (*ARMS['right'], GRIPPER)),
+    ):
+        robot = locate(parse([f'{folder}{os.sep}', *argv])[0])
+        assert {*waving_joints(robot, DRIVES, DRIVES)} == {*waving}
 
 
 def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

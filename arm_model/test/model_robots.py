@@ -37,19 +37,6 @@ def transform(xyz: list[float], rpy: list[float]) -> Matrix:
     return matrix
 
 
-def forward(root: ET.Element, angles: Mapping[str, float], tip: str) -> Matrix:
-    """Return the pose of a link in the root link, for joints that turn about their z axes."""
-    parents = {joint.find('child').get('link'): joint for joint in root.iter('joint')}  # type: ignore[union-attr]
-    pose = np.eye(4)
-    while (joint := parents.get(tip)) is not None:
-        origin = joint.find('origin')
-        here = transform(numbers(origin, 'xyz'), numbers(origin, 'rpy'))
-        turn = transform([0, 0, 0], [0, 0, angles.get(joint.get('name', ''), 0.0)])
-        pose = here @ turn @ pose
-        tip = joint.find('parent').get('link')  # type: ignore[union-attr,assignment]
-    return pose
-
-
 FOLDER = Path(__file__).parents[2] / 'arm_bringup' / 'robots'
 
 ROBOTS = ('panda', 'prbt', 'gp110')

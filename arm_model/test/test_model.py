@@ -161,14 +161,6 @@ def test_the_tip_is_where_the_maker_says(
     assert model.pose(np.array(positions)).position == pytest.approx(xyz, abs=1e-4)
 
 
-def test_ranges_of_the_gp110_are_those_of_its_data_sheet() -> None:
-    """Ranges and speeds in degrees, joint by joint."""
-    limits = robot('gp110').limits
-    assert np.degrees(limits.lower) == pytest.approx([-180, -90, -80, -360, -125, -360])
-    assert np.degrees(limits.upper) == pytest.approx([180, 155, 90, 360, 125, 360])
-    assert np.degrees(limits.velocity) == pytest.approx([140, 110, 130, 175, 175, 255], abs=0.01)
-
-
 @pytest.mark.parametrize(
     'model',
     [*map(robot, ROBOTS), *map(chain, CHAINS), *(two_arms(tip=tip) for tip in TIPS)],
@@ -186,6 +178,14 @@ def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:
     assert model.jacobian(at) == pytest.approx(np.array(differences).T, abs=1e-7)
 
 
+GP110 = {  # the data sheet's ranges and speeds in degrees, joint by joint
+    'lower': [-180, -90, -80, -360, -125, -360],
+    'upper': [180, 155, 90, 360, 125, 360],
+    'velocity': [140, 110, 130, 175, 175, 255],
+}
+SELDOM = {'panda': 'panda_link2 panda_link6', 'gp110': 'link_4_r link_6_t'}
+
+
 @pytest.mark.parametrize('name', ROBOTS)
 def test_named_poses_are_free(name: str) -> None:
     """The pose to start from is neither in contact nor singular; pairs are those of links."""
@@ -196,8 +196,9 @@ def test_named_poses_are_free(name: str) -> None:
     # links that seldom meet are checked; a cylinder with two spheres is one capsule
     pairs = [frozenset(pair) for pair in model.pairs]
     assert name != 'panda' or len(pairs) == len(set(pairs))
-    seldom = {'panda': 'panda_link2 panda_link6', 'gp110': 'link_4_r link_6_t'}.get(name, '')
-    assert not seldom or frozenset(seldom.split()) in pairs
+    assert name not in SELDOM or frozenset(SELDOM[name].split()) in pairs
+    for field, degrees in GP110.items() if name == 'gp110' else ():
+        assert np.degrees(getattr(model.limits, field)) == pytest.approx(degrees, abs=0.01)
 
 
 def test_continuous_joints_have_no_end() -> None:
@@ -280,6 +281,16 @@ def test_broken_files_are_refused(broken: Callable[[Texts], Texts], words: str) 
         RobotModel(*broken(chain_texts('zyy')))
 
 
+def test_unknown_names_are_refused_with_the_known_ones() -> None:
+    """Unknown groups, joints and links are refused, and those that exist are listed."""
+    with pytest.raises(ModelError, match=r"'leg'.*groups: arm"):
+        RobotModel(*chain_texts('zyy'), group='leg')
+    with pytest.raises(CommandError, match='joints: j1, j2, j3'):
+        chain('zyy').index('j4')
+    with pytest.raises(CommandError, match='link_3'):
+        chain('zyy').pose(np.zeros(3), 'hand')
+
+
 def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     """MoveIt's wizard writes no jerk, often no acceleration, and the description's velocity 0."""
     urdf, srdf, _ = chain_texts('zyp')
@@ -298,16 +309,6 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     assert units == ['rad/s', 'rad/s2', 'max_acceleration', 'm/s', 'm/s2']
     del table['j1']  # the wizard leaves joints out that it asks no limits of
     assert RobotModel(urdf, srdf, table).limits.velocity.tolist() == [2.0] * 3
-
-
-def test_unknown_names_are_refused_with_the_known_ones() -> None:
-    """Unknown groups, joints and links are refused, and those that exist are listed."""
-    with pytest.raises(ModelError, match=r"'leg'.*groups: arm"):
-        RobotModel(*chain_texts('zyy'), group='leg')
-    with pytest.raises(CommandError, match='joints: j1, j2, j3'):
-        chain('zyy').index('j4')
-    with pytest.raises(CommandError, match='link_3'):
-        chain('zyy').pose(np.zeros(3), 'hand')
 
 
 def test_poses_that_cannot_be_taken_are_noted() -> None:
