@@ -14,18 +14,10 @@ from two_arms import ARMS, DRIVES, GRIPPER, write_two_arms
 import urdf_reader
 from urdf_reader import parse_srdf, read_urdf
 
+from arm_bringup import robots
 from arm_bringup.bringup import parse
 from arm_bringup.examples.wave import waving_joints
 from arm_bringup.groups import choose_groups, moved_groups, MovedGroups
-from arm_bringup.robots import (
-    DescriptionError,
-    expand_xacro,
-    find_robot,
-    read_description,
-    read_semantic,
-    Robot,
-    RobotError,
-)
 from arm_bringup.session import locate
 
 XACRO = 'xmlns:xacro="http://wiki.ros.org/xacro"'
@@ -41,9 +33,9 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
-def found(folder: Path) -> Robot:
+def found(folder: Path) -> robots.Robot:
     """Read a robot folder."""
-    return find_robot(f'{folder}{os.sep}', folder)
+    return robots.find_robot(f'{folder}{os.sep}', folder)
 
 
 def test_names_that_moveit_and_vendors_give_their_files(folder: Path, tmp_path: Path) -> None:
@@ -56,8 +48,8 @@ def test_names_that_moveit_and_vendors_give_their_files(folder: Path, tmp_path: 
     (folder / 'joint_limits.yaml').touch()
     robot = found(folder)
     assert robot.lacking == ''
-    assert '<link name="base"/>' in read_description(robot)
-    assert '<robot name="arm"/>' in read_semantic(robot)
+    assert '<link name="base"/>' in robots.read_description(robot)
+    assert '<robot name="arm"/>' in robots.read_semantic(robot)
     config = tmp_path / 'vendor_moveit_config' / 'config'
     config.mkdir(parents=True)
     (config / 'vendor.srdf').write_text('<robot name="vendor"/>')
@@ -66,7 +58,7 @@ def test_names_that_moveit_and_vendors_give_their_files(folder: Path, tmp_path: 
         'tip_link: tool0\n'
     )
     robot = found(folder)
-    assert 'vendor' in read_semantic(robot)
+    assert 'vendor' in robots.read_semantic(robot)
     assert (robot.groups, robot.tip_link) == (('manipulator',), 'tool0')
 
 
@@ -85,7 +77,7 @@ def test_names_that_moveit_and_vendors_give_their_files(folder: Path, tmp_path: 
 def test_a_robot_yaml_that_cannot_be_used_says_what(folder: Path, text: str, words: str) -> None:
     """The key, and those that there are."""
     (folder / 'robot.yaml').write_text(text)
-    with pytest.raises(RobotError, match=words):
+    with pytest.raises(robots.RobotError, match=words):
         found(folder)
 
 
@@ -98,7 +90,7 @@ def test_xacro_arguments_of_the_folder_and_of_the_command_line(folder: Path) -> 
     (folder / 'robot.yaml').write_text('xacro_args: {name: arm, kind: ur5, big: true}')
     argv = [f'{folder}{os.sep}', '--xacro-arg', 'kind:=ur10e', '--group', 'left']
     robot = locate(parse(argv)[0])
-    for read in (read_description, read_semantic):
+    for read in (robots.read_description, robots.read_semantic):
         assert '<robot name="arm">' in read(robot)
         assert '<link name="ur10e_true"/>' in read(robot)
     assert robot.groups == ('left',)
@@ -146,14 +138,15 @@ def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_pat
     )
     before = os.environ['AMENT_PREFIX_PATH']
     with pytest.raises(
-        DescriptionError, match=r"arm.xacro: package 'vendor_description' .*packages: \{vendor_d"
+        robots.DescriptionError,
+        match=r"arm.xacro: package 'vendor_description' .*packages: \{vendor_d",
     ) as refused:
-        read_description(found(folder))
+        robots.read_description(found(folder))
     assert len(str(refused.value)) < 400  # not every folder that was searched
     (folder / 'robot.yaml').write_text(
         'packages:\n  vendor_description: ../share/vendor_description\n  vendor: ../share\n'
     )
-    urdf = read_description(found(folder))
+    urdf = robots.read_description(found(folder))
     assert f'"{shared.as_uri()}/base.stl"' in urdf
     for name in (f'file://{shared}/tip.stl', f'file:///{shared.parent}/tip.stl'):
         assert f'<link name="{name}"/>' in urdf  # not a temporary folder
@@ -166,7 +159,7 @@ def test_meshes_beside_the_description_are_found_by_every_node(folder: Path) -> 
     shape = '<collision><geometry><mesh scale="1 1 1" filename="{}"/></geometry></collision>'
     link = f'<link name="base">{"".join(map(shape.format, names))}</link>'
     (folder / 'arm.urdf').write_text(f'<robot name="arm">{link}</robot>')
-    located = re.findall('filename="(.*?)"', read_description(found(folder)))
+    located = re.findall('filename="(.*?)"', robots.read_description(found(folder)))
     assert located == [f'{folder.as_uri()}/meshes/a%20b.stl', *names[1:]]
 
 
@@ -185,7 +178,7 @@ def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) ->
         '<xacro:macro name="tool" params="n"><link name="${n}"/>'
         '<xacro:arm_gazebo/></xacro:macro><xacro:tool n="tool0"/></robot>'
     )
-    urdf = expand_xacro(file)
+    urdf = robots.expand_xacro(file)
     assert '<link name="base"/>' in urdf
     assert '<link name="tool0"/>' in urdf
     assert 'xacro:' not in urdf
@@ -199,8 +192,8 @@ def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) ->
         (f'<robot name="$(arg name)" {XACRO}/>', r"'name' has no value.*--xacro-arg name:=VALUE"),
     ):
         file.write_text(text)
-        with pytest.raises(DescriptionError, match=words):
-            expand_xacro(file)
+        with pytest.raises(robots.DescriptionError, match=words):
+            robots.expand_xacro(file)
 
 
 JOINT = (
@@ -248,7 +241,7 @@ def test_groups_that_cannot_be_moved_are_reported(folder: Path) -> None:
         ('abcd', 'group: [left, wide]', 'group wide shares joints with left'),
         ('d', '', 'no group of arm.srdf has a drive for each joint'),
     ):
-        with pytest.raises(RobotError, match=words):
+        with pytest.raises(robots.RobotError, match=words):
             groups(folder, drives, settings)
 
 
@@ -287,5 +280,5 @@ def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyP
         (folder / 'arm.xacro').write_text(text)
         robot = found(folder)
         for _ in range(2):
-            assert f'<link name="{link}"/>' in read_description(robot)
+            assert f'<link name="{link}"/>' in robots.read_description(robot)
         assert len(expanded) == turn

@@ -11,17 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from arm_bringup import robots
 from arm_bringup.check import check_robot
 from arm_bringup.groups import start_positions, StartPositions
-from arm_bringup.robots import (
-    find_robot,
-    read_bus,
-    read_description,
-    Robot,
-    robot_names,
-    RobotError,
-    stream_mode_service,
-)
 from arm_bringup.session import arm_processes, Stack
 from arm_canopen import load_bus
 from arm_model import frozen, load_limits, RobotModel
@@ -31,7 +23,7 @@ RANGES = {'lift': (0.0, 0.5), 'turn': (0.3, 2.0), 'swing': (-3.0, 3.0), 'bend': 
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Robot:
+def robot(tmp_path: Path) -> robots.Robot:
     """Make an arm on a lift whose second joint does not reach 0, and whose links fold at 0."""
     folder = tmp_path / 'arm'
     folder.mkdir()
@@ -48,7 +40,7 @@ def robot(tmp_path: Path) -> Robot:
     for number, name in enumerate((*RANGES, 'finger'), start=2):
         rows.append(f'{name}: {{node_id: {number}, {drive}}}')
     (folder / 'bus.yml').write_text('\n'.join(rows))
-    return find_robot(f'{folder}/', tmp_path)
+    return robots.find_robot(f'{folder}/', tmp_path)
 
 
 def urdf(ranges: dict[str, tuple[float, float]], finger: tuple[float, float] = (0, 0.04)) -> str:
@@ -71,15 +63,15 @@ def urdf(ranges: dict[str, tuple[float, float]], finger: tuple[float, float] = (
     return ''.join(parts)
 
 
-def start_of(robot: Robot) -> StartPositions:
+def start_of(robot: robots.Robot) -> StartPositions:
     """Choose the start of a robot folder."""
-    return start_positions(robot, read_description(robot), read_bus(robot).joints)
+    return start_positions(robot, robots.read_description(robot), robots.read_bus(robot).joints)
 
 
-def model_of(robot: Robot) -> RobotModel:
+def model_of(robot: robots.Robot) -> RobotModel:
     """Build the arm."""
     text = robot.semantic.read_text()
-    return RobotModel(read_description(robot), text, load_limits(robot.limits))
+    return RobotModel(robots.read_description(robot), text, load_limits(robot.limits))
 
 
 @pytest.mark.slow
@@ -91,7 +83,7 @@ def model_of(robot: Robot) -> RobotModel:
     ],
 )
 def test_an_arm_that_cannot_stand_at_0_starts_elsewhere(
-    robot: Robot, turn: tuple[float, float], why: str
+    robot: robots.Robot, turn: tuple[float, float], why: str
 ) -> None:
     """In its ranges, from a pose that is free; the log has joint and range, or the links."""
     robot.description.write_text(urdf({**RANGES, 'turn': turn}))
@@ -111,7 +103,7 @@ def test_an_arm_that_cannot_stand_at_0_starts_elsewhere(
 
 
 @pytest.mark.slow
-def test_a_drive_beside_the_groups_starts_in_its_range(robot: Robot) -> None:
+def test_a_drive_beside_the_groups_starts_in_its_range(robot: robots.Robot) -> None:
     """In the middle; the group, which can stand at 0, stays there."""
     ranges = dict.fromkeys(RANGES, (-2.0, 2.0))
     text = urdf(ranges, (0.01, 0.04)).replace('xyz="-0.3 0 -0.05"', 'xyz="0.3 0 0.12"')
@@ -120,14 +112,14 @@ def test_a_drive_beside_the_groups_starts_in_its_range(robot: Robot) -> None:
     assert start.positions == {'finger': pytest.approx(0.025)}
 
 
-def given(robot: Robot, text: str) -> Robot:
+def given(robot: robots.Robot, text: str) -> robots.Robot:
     """Return a robot with start positions of robot.yaml."""
     (robot.folder / 'robot.yaml').write_text(f'start_positions: {text}')
-    return find_robot(f'{robot.folder}/', robot.folder)
+    return robots.find_robot(f'{robot.folder}/', robot.folder)
 
 
 @pytest.mark.slow
-def test_robot_yaml_has_the_last_word(robot: Robot) -> None:
+def test_robot_yaml_has_the_last_word(robot: robots.Robot) -> None:
     """Places of drives, or a pose of the SRDF, of its joints that have drives.
 
     A name that is no drive or no pose is refused with those that there are, by check too.
@@ -144,14 +136,14 @@ def test_robot_yaml_has_the_last_word(robot: Robot) -> None:
         ('bark', "the SRDF has no pose 'bark'; poses: park"),
     ):
         wrong = given(robot, text)
-        with pytest.raises(RobotError, match=words):
+        with pytest.raises(robots.RobotError, match=words):
             start_of(wrong)
         assert any(words in str(finding) for finding in check_robot(wrong))
     robot.semantic.unlink()
-    with pytest.raises(RobotError, match="'bark' is a pose of the SRDF, and there is none"):
+    with pytest.raises(robots.RobotError, match="'bark' is a pose of the SRDF, and there is none"):
         start_of(given(robot, 'bark'))
     for text in ('[1]', '{turn: high}', '{turn: true}'):
-        with pytest.raises(RobotError, match='start_positions'):
+        with pytest.raises(robots.RobotError, match='start_positions'):
             given(robot, text)
 
 
@@ -159,7 +151,7 @@ def test_robot_yaml_has_the_last_word(robot: Robot) -> None:
 @pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110'])
 def test_the_robots_here(name: str) -> None:
     """They name the pose that would be found for them, which takes a second to import."""
-    robot = find_robot(name, ROBOTS)
+    robot = robots.find_robot(name, ROBOTS)
     found = start_of(replace(robot, start_positions={})).positions
     given = start_of(robot).positions
     assert {joint: at for joint, at in given.items() if at} == pytest.approx(
@@ -169,7 +161,7 @@ def test_the_robots_here(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_simulated_drives_get_them(robot: Robot, tmp_path: Path) -> None:
+def test_the_simulated_drives_get_them(robot: robots.Robot, tmp_path: Path) -> None:
     """As parameters that ROS takes for numbers."""
     program = tmp_path / 'program'
     program.touch(mode=0o755)
@@ -191,7 +183,7 @@ def test_a_robot_is_found_by_name_or_path(tmp_path: Path, monkeypatch: pytest.Mo
 
     What is not there is said: an unknown name with those that exist, all files that are missing.
     """
-    robot = find_robot('panda', ROBOTS)
+    robot = robots.find_robot('panda', ROBOTS)
     assert robot.name == 'panda'
     assert robot.bus_config == ROBOTS / 'panda' / 'bus.yml'
     assert robot.description == ROBOTS / 'panda' / 'panda.urdf.xacro'
@@ -203,13 +195,13 @@ def test_a_robot_is_found_by_name_or_path(tmp_path: Path, monkeypatch: pytest.Mo
         ('./my_arm', 'lacks bus.yml and my_arm.urdf.xacro'),
         ('./nowhere', 'does not exist'),
     ):
-        with pytest.raises(RobotError, match=words):
-            find_robot(name, ROBOTS)
+        with pytest.raises(robots.RobotError, match=words):
+            robots.find_robot(name, ROBOTS)
     (folder / 'bus.yml').touch()
     (folder / 'my_arm.urdf.xacro').touch()
-    robot = find_robot(f'.{os.sep}my_arm', ROBOTS)
+    robot = robots.find_robot(f'.{os.sep}my_arm', ROBOTS)
     assert (robot.name, robot.bus_config) == ('my_arm', folder / 'bus.yml')
-    assert robot_names(tmp_path) == ['my_arm']
+    assert robots.robot_names(tmp_path) == ['my_arm']
 
 
 def test_there_is_one_source_of_the_eds() -> None:
@@ -239,7 +231,7 @@ def test_the_bus_of_an_article_has_a_drive_for_each_joint(
     assert all(node.is_drive for node in bus.nodes)
     assert bus.warnings == ()
     assert bus.master.sync_period == pytest.approx(0.01)
-    assert stream_mode_service(read_bus(find_robot(name, ROBOTS))) == mode
+    assert robots.stream_mode_service(robots.read_bus(robots.find_robot(name, ROBOTS))) == mode
     if name == 'prbt':  # thousandths of a degree
         for node in bus.nodes:
             assert node.drive.position_mode == 7

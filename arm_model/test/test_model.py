@@ -18,17 +18,7 @@ import pinocchio as pin
 import pytest
 
 import arm_model
-from arm_model import (
-    Array,
-    Clearances,
-    CommandError,
-    example_files,
-    load_limits,
-    ModelError,
-    names_of,
-    Pose,
-    RobotModel,
-)
+import arm_model as am
 
 
 def test_each_group_is_an_arm_of_its_own() -> None:
@@ -71,7 +61,7 @@ def test_joints_beside_a_group_stand_where_they_are_said_to(seed: int) -> None:
         assert pose.position == pytest.approx(whole.position, abs=1e-12)
         assert pose.rotation == pytest.approx(whole.rotation, abs=1e-12)
     distances, least = (
-        dict(zip(model.pairs, Clearances(model.scene).least(at, math.inf), strict=True))
+        dict(zip(model.pairs, am.Clearances(model.scene).least(at, math.inf), strict=True))
         for model, at in ((both, everywhere), (moved, here))
     )
     assert least == pytest.approx({pair: distances[pair] for pair in moved.pairs}, abs=1e-9)
@@ -79,7 +69,7 @@ def test_joints_beside_a_group_stand_where_they_are_said_to(seed: int) -> None:
     again = left.kinematics.link_pose('right_2_link', here)
     assert again.position.tolist() == before.position.tolist()
     assert left.with_others({'left_1': 0.5, 'right_1': 0.0}) is left
-    with pytest.raises(CommandError, match='right_1: its position is nan'):
+    with pytest.raises(am.CommandError, match='right_1: its position is nan'):
         left.with_others({'right_1': math.nan})
 
 
@@ -91,9 +81,9 @@ README = Path(__file__).parents[1] / 'README.md'
 @pytest.mark.parametrize('name', ROBOTS)
 def test_names_are_those_of_the_model(name: str) -> None:
     """The description alone is enough for the joints: the longest chain."""
-    model, found = robot(name), names_of(*texts(name))
+    model, found = robot(name), am.names_of(*texts(name))
     assert (found.joints, found.base, found.tool) == (model.joints, model.base, model.tip)
-    assert names_of(texts(name)[0]).joints == model.joints
+    assert am.names_of(texts(name)[0]).joints == model.joints
 
 
 def test_names_of_broken_texts_are_refused() -> None:
@@ -110,8 +100,8 @@ def test_names_of_broken_texts_are_refused() -> None:
         ("no link 'nowhere'", urdf, srdf.replace('"base"', '"nowhere"')),
         ('loop', f'<robot name="r">{loop}</robot>'),
     ):
-        with pytest.raises(ModelError, match=words):
-            names_of(*broken)
+        with pytest.raises(am.ModelError, match=words):
+            am.names_of(*broken)
 
 
 def test_the_public_names_are_in_the_table() -> None:
@@ -137,13 +127,13 @@ CHECKS = [
 ]
 
 
-def twist_between(before: Pose, after: Pose) -> Array:
+def twist_between(before: am.Pose, after: am.Pose) -> am.Array:
     """Return the twist from one pose to another in unit time."""
     angular = pin.log3(after.rotation @ before.rotation.T)
     return np.concatenate((after.position - before.position, angular))
 
 
-def any_position(model: RobotModel, seed: int) -> Array:
+def any_position(model: am.RobotModel, seed: int) -> am.Array:
     """Return joint positions within the limits."""
     lower = np.maximum(model.limits.lower, -math.pi)
     upper = np.minimum(model.limits.upper, math.pi)
@@ -157,7 +147,7 @@ def test_the_tip_is_where_the_maker_says(
     """Forward kinematics meets the check poses; any link at the end can be the tip."""
     model = robot(name.partition('_')[0])
     if '_' in name:
-        model = RobotModel(*texts(model.name), table(model.name), tip=name)
+        model = am.RobotModel(*texts(model.name), table(model.name), tip=name)
     assert model.pose(np.array(positions)).position == pytest.approx(xyz, abs=1e-4)
 
 
@@ -168,7 +158,7 @@ def test_the_tip_is_where_the_maker_says(
 )
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:
+def test_jacobians_are_differences(model: am.RobotModel, seed: int) -> None:
     """Of chains of 3 to 8 joints and of a tree the Jacobian is the difference of the pose."""
     at, step = any_position(model, seed), 1e-6
     differences = [
@@ -219,7 +209,7 @@ def test_a_wheel_beside_the_arm_needs_no_limits() -> None:
             f'<child link="{name}"/>{limit}</joint></robot>'
         )
         urdf = urdf.replace('</robot>', wheel)
-    model = RobotModel(urdf, srdf, limits)
+    model = am.RobotModel(urdf, srdf, limits)
     assert model.joints == ('j1', 'j2', 'j3')
     assert 'left' in model.frames
 
@@ -239,7 +229,7 @@ def test_soft_limits_narrow_a_joint(
     """As in MoveIt: a limits file comes before them; some controllers have gains alone."""
     urdf, srdf, limits = chain_texts('zyy')
     urdf = urdf.replace(LIMIT, f'{LIMIT}<safety_controller k_velocity="20" {soft}/>', 1)
-    model = RobotModel(urdf, srdf, {**limits, 'j1': {**limits['j1'], **entry}})
+    model = am.RobotModel(urdf, srdf, {**limits, 'j1': {**limits['j1'], **entry}})
     assert (model.limits.lower[0], model.limits.upper[0]) == wanted
 
 
@@ -277,17 +267,17 @@ BROKEN: dict[str, tuple[Callable[[Texts], Texts], str]] = {
 @pytest.mark.parametrize(('broken', 'words'), BROKEN.values(), ids=BROKEN.keys())
 def test_broken_files_are_refused(broken: Callable[[Texts], Texts], words: str) -> None:
     """What does not make an arm is refused in words that name it."""
-    with pytest.raises(ModelError, match=words):
-        RobotModel(*broken(chain_texts('zyy')))
+    with pytest.raises(am.ModelError, match=words):
+        am.RobotModel(*broken(chain_texts('zyy')))
 
 
 def test_unknown_names_are_refused_with_the_known_ones() -> None:
     """Unknown groups, joints and links are refused, and those that exist are listed."""
-    with pytest.raises(ModelError, match=r"'leg'.*groups: arm"):
-        RobotModel(*chain_texts('zyy'), group='leg')
-    with pytest.raises(CommandError, match='joints: j1, j2, j3'):
+    with pytest.raises(am.ModelError, match=r"'leg'.*groups: arm"):
+        am.RobotModel(*chain_texts('zyy'), group='leg')
+    with pytest.raises(am.CommandError, match='joints: j1, j2, j3'):
         chain('zyy').index('j4')
-    with pytest.raises(CommandError, match='link_3'):
+    with pytest.raises(am.CommandError, match='link_3'):
         chain('zyy').pose(np.zeros(3), 'hand')
 
 
@@ -298,7 +288,7 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     wizard |= {'has_acceleration_limits': False, 'max_acceleration': 0}
     table: dict[str, Any] = dict.fromkeys(('j1', 'j2', 'j3'), wizard)
     table['j2'] = {'has_acceleration_limits': True, 'max_acceleration': 5}
-    model = RobotModel(urdf.replace('velocity="2"', 'velocity="0"'), srdf, table)
+    model = am.RobotModel(urdf.replace('velocity="2"', 'velocity="0"'), srdf, table)
     assert model.limits.velocity.tolist() == [1.0, 1.0, 0.1]
     assert model.limits.acceleration.tolist() == [1.0, 5.0, 1.0]
     assert model.limits.jerk.tolist() == [20.0, 100.0, 20.0]
@@ -308,7 +298,7 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     units = [note.partition(':')[0].rpartition(' ')[2] for note in defaults]
     assert units == ['rad/s', 'rad/s2', 'max_acceleration', 'm/s', 'm/s2']
     del table['j1']  # the wizard leaves joints out that it asks no limits of
-    assert RobotModel(urdf, srdf, table).limits.velocity.tolist() == [2.0] * 3
+    assert am.RobotModel(urdf, srdf, table).limits.velocity.tolist() == [2.0] * 3
 
 
 def test_poses_that_cannot_be_taken_are_noted() -> None:
@@ -318,7 +308,7 @@ def test_poses_that_cannot_be_taken_are_noted() -> None:
     for name, places in (('far', (9, 0, 0)), ('half', (0,)), ('zero', (0, 0, 0))):
         joints = [f'<joint name="j{n}" value="{at}"/>' for n, at in enumerate(places, 1)]
         poses += f'<group_state name="{name}" group="arm">{"".join(joints)}</group_state>'
-    model = RobotModel(urdf, srdf.replace('</robot>', f'{poses}</robot>'), limits)
+    model = am.RobotModel(urdf, srdf.replace('</robot>', f'{poses}</robot>'), limits)
     assert list(model.poses) == ['zero']
     far, half = (note for note in model.notes if note.startswith('pose'))
     assert "'far'" in far
@@ -331,16 +321,16 @@ def test_limits_files(tmp_path: Path) -> None:
     Packages of ROS 2 have it at the depth at which move_group reads it.
     """
     path = tmp_path / 'limits.yaml'
-    with pytest.raises(ModelError, match=r'limits\.yaml'):
-        load_limits(path)
+    with pytest.raises(am.ModelError, match=r'limits\.yaml'):
+        am.load_limits(path)
     for text in ('joints: {}', '[1]', 'joint_limits: 3', 'a: {joint_limits: {}}'):
         path.write_text(text, encoding='utf-8')
-        with pytest.raises(ModelError, match='joint_limits'):
-            load_limits(path)
+        with pytest.raises(am.ModelError, match='joint_limits'):
+            am.load_limits(path)
     for above in ('', 'robot_description_planning: ', '/**: {ros__parameters: '):
         table = '{joint_limits: {j1: {max_jerk: 9.0}}}'
         path.write_text(f'{above}{table}{"}" * above.count("{")}', encoding='utf-8')
-        assert load_limits(path) == {'j1': {'max_jerk': 9.0}}
+        assert am.load_limits(path) == {'j1': {'max_jerk': 9.0}}
 
 
 def test_links_may_be_checked_by_name_only() -> None:
@@ -354,16 +344,19 @@ def test_links_may_be_checked_by_name_only() -> None:
         '<enable_collisions link1="link_1" link2="link_3"/>'
         '<disable_collisions link1="link_1" link2="link_3"/></robot>'
     )
-    model = RobotModel(urdf, srdf.replace('</robot>', words), limits)
+    model = am.RobotModel(urdf, srdf.replace('</robot>', words), limits)
     left = {pair for pair in everything if 'link_1' not in pair}
     assert set(map(frozenset, model.pairs)) == left | {frozenset(('link_1', 'link_4'))}
 
 
 def test_files_are_read(tmp_path: Path) -> None:
     """As the constructor takes their texts; one that is not there is named."""
-    files = example_files()
+    files = am.example_files()
     urdf, srdf = files.urdf.read_text(), files.srdf.read_text()
-    one, same = RobotModel.from_files(*files), RobotModel(urdf, srdf, load_limits(files.limits))
+    one, same = (
+        am.RobotModel.from_files(*files),
+        am.RobotModel(urdf, srdf, am.load_limits(files.limits)),
+    )
     assert (one.name, one.joints, one.tip) == (same.name, same.joints, same.tip)
-    with pytest.raises(ModelError, match=r'none\.srdf'):
-        RobotModel.from_files(files.urdf, tmp_path / 'none.srdf', files.limits)
+    with pytest.raises(am.ModelError, match=r'none\.srdf'):
+        am.RobotModel.from_files(files.urdf, tmp_path / 'none.srdf', files.limits)

@@ -18,16 +18,7 @@ from model_robots import chain_texts
 import numpy as np
 import pytest
 
-from arm_model import (
-    Array,
-    Clearances,
-    CollisionObject,
-    combined,
-    ModelError,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+import arm_model as am
 from arm_model.scene import meshes, pieces
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
@@ -87,12 +78,12 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / 'cache' / 'arm_model' / 'hulls'
 
 
-def arm(geometry: str, folder: Path | None = None, srdf: str = '') -> RobotModel:
+def arm(geometry: str, folder: Path | None = None, srdf: str = '') -> am.RobotModel:
     """Return a chain of four joints with links of a geometry."""
     urdf, semantic, limits = chain_texts('zyyy')
     semantic = semantic.replace('</robot>', f'{srdf}</robot>')
     urdf = urdf.replace(SHAPE, f'<geometry>{geometry}</geometry>')
-    return RobotModel(urdf, semantic, limits, folder=folder)
+    return am.RobotModel(urdf, semantic, limits, folder=folder)
 
 
 @pytest.mark.parametrize(
@@ -116,8 +107,8 @@ def test_a_mesh_is_the_shape_that_it_shows(
     rng = np.random.default_rng(1)
     for _ in range(20):
         at = rng.uniform(-2.0, 2.0, 4)
-        exact = Clearances(box.scene).least(at, math.inf)
-        assert Clearances(mesh.scene).least(at, math.inf) == pytest.approx(exact, abs=1e-5)
+        exact = am.Clearances(box.scene).least(at, math.inf)
+        assert am.Clearances(mesh.scene).least(at, math.inf) == pytest.approx(exact, abs=1e-5)
 
 
 @settings(max_examples=25, deadline=None)
@@ -185,12 +176,12 @@ def test_bodies_that_lie_apart_have_a_hull_each(tmp_path: Path) -> None:
             meshes._hulls.cache_clear()
     model = arm('<mesh filename="cubes.obj" scale="0.02 0.02 0.02"/>', tmp_path)
     assert [len(each) for each in model.scene.link_shapes.values()] == [2] * 4
-    ball, at = CollisionObject('ball', Sphere(0.003)), np.zeros(4)
+    ball, at = am.CollisionObject('ball', am.Sphere(0.003)), np.zeros(4)
     placed = model.scene.link_shapes['link_4'][0].pose
-    link = combined(model.kinematics.link_pose('link_4', at), placed)
+    link = am.combined(model.kinematics.link_pose('link_4', at), placed)
     for x, touches in ((0.015, False), (0.0, True), (0.03, True)):
-        middle = Pose(link.rotation, link.position + link.rotation @ [x, 0.0, 0.0])
-        contacts = Clearances(model.scene.with_object(ball.at(middle))).contacts(at)
+        middle = am.Pose(link.rotation, link.position + link.rotation @ [x, 0.0, 0.0])
+        contacts = am.Clearances(model.scene.with_object(ball.at(middle))).contacts(at)
         assert any('ball' in each.bodies for each in contacts) is touches
 
 
@@ -300,18 +291,18 @@ def test_what_cannot_be_used_is_one_note(mesh: str, words: str, tmp_path: Path) 
     assert 'link_1, link_2, link_3, link_4: ' in note
     assert model.pairs == ()
     path.write_text(stl(), encoding='utf-8')
-    with pytest.raises(ModelError, match='scale'):
+    with pytest.raises(am.ModelError, match='scale'):
         arm('<mesh filename="link.stl" scale="1 1"/>', tmp_path)
 
 
 def test_links_without_a_shape_are_named() -> None:
     """The others are checked all the same."""
     urdf, srdf, limits = chain_texts('zyyyy')
-    model = RobotModel(urdf.replace(SHAPE, '<geometry/>', 1), srdf, limits)
+    model = am.RobotModel(urdf.replace(SHAPE, '<geometry/>', 1), srdf, limits)
     checked = {link for pair in model.pairs for link in pair}
     assert checked == {'link_2', 'link_3', 'link_4', 'link_5'}
     assert 'link_1: an empty <geometry>' in model.notes[0]
-    bare = RobotModel(re.sub('<collision>.*?</collision>', '', urdf), srdf, limits)
+    bare = am.RobotModel(re.sub('<collision>.*?</collision>', '', urdf), srdf, limits)
     assert bare.notes == ('no link has a <collision>, so self-collision is not checked',)
 
 
@@ -402,10 +393,10 @@ def test_pieces_of_a_body_hold_it_and_leave_its_gap_free(
     weights = np.random.default_rng(1).dirichlet((1.0, 1.0, 1.0), (20, len(faces)))
     surface = np.einsum('stk,tkx->stx', weights, corners[faces]).reshape(-1, 3)
 
-    def outside(points: Array) -> Array:
+    def outside(points: am.Array) -> am.Array:
         """Return how far each point is outside of the piece that is nearest."""
         walls = ((np.array(hull.normals()), np.array(hull.offsets())) for hull in hulls)
-        distances: Array = np.min([(points @ n.T + d).max(axis=1) for n, d in walls], axis=0)
+        distances: am.Array = np.min([(points @ n.T + d).max(axis=1) for n, d in walls], axis=0)
         return distances
 
     assert outside(np.concatenate([corners, surface])).max() < 1e-9

@@ -13,17 +13,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from control_msgs.msg import JointTrajectoryControllerState
 from isolation import Isolation, reserve
-from move_group_rig import (
-    action_goal,
-    joint_goal,
-    JOINTS,
-    motion_request,
-    MoveGroupRig,
-    moveit_package,
-    panda_parameters,
-    pose_goal,
-    READY,
-)
+import move_group_rig as mg
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import (
@@ -47,7 +37,7 @@ from arm_planning.nodes import move_group
 FIXED = 'panda_joint8'
 FINGERS = ['panda_finger_joint1', 'panda_finger_joint2']
 MOVERS = ['panda_arm_controller', 'panda_hand_controller']
-MOVED = [0.4, *READY[1:]]
+MOVED = [0.4, *mg.READY[1:]]
 
 
 def settings_of(folder: Path) -> Any:
@@ -58,7 +48,7 @@ def settings_of(folder: Path) -> Any:
 
 def test_packages_of_the_assistant_are_read(tmp_path: Path) -> None:
     """Limits in a table of their own or without one; files of former versions."""
-    folder = moveit_package('panda', tmp_path)
+    folder = mg.moveit_package('panda', tmp_path)
     path = folder / 'config' / 'joint_limits.yaml'
     lines = path.read_text().splitlines()
     for text in ('\n'.join(lines), 'robot_description_planning:\n  ' + '\n  '.join(lines)):
@@ -68,7 +58,7 @@ def test_packages_of_the_assistant_are_read(tmp_path: Path) -> None:
         assert settings.ik_timeouts == {'panda_arm': 0.25}
         assert settings.planners.configs['TRRTkConfigDefault']['min_temperature'] == 1e-9
     # names in capitals, a URDF elsewhere, controllers by the robot's name, no planner_configs
-    folder = moveit_package('prbt', tmp_path)
+    folder = mg.moveit_package('prbt', tmp_path)
     package = read_package(folder)
     assert '<robot name="prbt"' in str(package.parameters['robot_description'])
     names = package.parameters['moveit_simple_controller_manager.controller_names']
@@ -108,7 +98,7 @@ def test_a_broken_file_is_refused_with_its_place(
     tmp_path: Path, file: str, before: str, after: str, words: str
 ) -> None:
     """File, line, key and what it must be."""
-    folder = moveit_package('panda', tmp_path)
+    folder = mg.moveit_package('panda', tmp_path)
     path = folder / 'config' / file
     text = path.read_text()
     line = text[: text.index(before)].count('\n') + before.count('\n') + 1
@@ -132,7 +122,7 @@ def test_a_broken_file_is_refused_with_its_place(
 )
 def test_what_is_missing_is_named(tmp_path: Path, remove: str, words: str) -> None:
     """The file that names it too."""
-    folder = moveit_package('panda', tmp_path)
+    folder = mg.moveit_package('panda', tmp_path)
     path = folder / remove
     path.rename(tmp_path / 'elsewhere')
     with pytest.raises(ConfigError, match=words):
@@ -140,13 +130,13 @@ def test_what_is_missing_is_named(tmp_path: Path, remove: str, words: str) -> No
 
 
 @pytest.fixture(name='panda', scope='module')
-def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
+def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[mg.MoveGroupRig]:
     """Start move_group with the Panda's package."""
-    folder = moveit_package('panda', tmp_path_factory.mktemp('package'))
-    positions = dict(zip([*JOINTS, 'panda_finger_joint1'], [*READY, 0.0], strict=True))
+    folder = mg.moveit_package('panda', tmp_path_factory.mktemp('package'))
+    positions = dict(zip([*mg.JOINTS, 'panda_finger_joint1'], [*mg.READY, 0.0], strict=True))
     with (
         reserve() as isolation,
-        MoveGroupRig(isolation, '--moveit-config', str(folder), positions=positions) as rig,
+        mg.MoveGroupRig(isolation, '--moveit-config', str(folder), positions=positions) as rig,
     ):
         yield rig
 
@@ -157,12 +147,12 @@ def duration(response: Any) -> float:
     return seconds(response.trajectory.joint_trajectory.points[-1].time_from_start)
 
 
-def test_planners_of_the_package_plan(panda: MoveGroupRig) -> None:
+def test_planners_of_the_package_plan(panda: mg.MoveGroupRig) -> None:
     """By all names that clients have for them; those that are not here have another search."""
-    goal = joint_goal(MOVED)
+    goal = mg.joint_goal(MOVED)
     for name in ('', 'panda_arm', 'RRTConnectkConfigDefault', 'panda_arm[TRRTkConfigDefault]'):
-        assert duration(panda.plan(motion_request(goal, planner_id=name)))
-    code = panda.plan(motion_request(goal, planner_id='Dijkstra')).error_code
+        assert duration(panda.plan(mg.motion_request(goal, planner_id=name)))
+    code = panda.plan(mg.motion_request(goal, planner_id='Dijkstra')).error_code
     assert code.val != MoveItErrorCodes.SUCCESS
     assert re.search("'Dijkstra'; choose one of RRT.*, TRRTkConfigDefault, PTP", code.message)
     # RViz takes the names of a group out of the brackets
@@ -179,9 +169,9 @@ def test_planners_of_the_package_plan(panda: MoveGroupRig) -> None:
     }  # fmt: skip
 
 
-def test_the_packages_factors_count_where_a_request_has_none(panda: MoveGroupRig) -> None:
+def test_the_packages_factors_count_where_a_request_has_none(panda: mg.MoveGroupRig) -> None:
     """A tenth of velocity and acceleration, as beginners get it."""
-    request = motion_request(joint_goal(MOVED))
+    request = mg.motion_request(mg.joint_goal(MOVED))
     lasts = []
     for factor in (0.0, 0.1, 1.0):
         request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = factor
@@ -191,12 +181,12 @@ def test_the_packages_factors_count_where_a_request_has_none(panda: MoveGroupRig
     assert beginners > 2.0 * whole
 
 
-def test_cartesian_limits_of_the_package_bound_a_line(panda: MoveGroupRig) -> None:
+def test_cartesian_limits_of_the_package_bound_a_line(panda: mg.MoveGroupRig) -> None:
     """0.5 m/s; the world of the SRDF is the frame of the goal."""
     pose = panda.fk()
     pose.position.z -= 0.2
-    request = motion_request(
-        pose_goal(pose, 'panda_link8', 'world'),
+    request = mg.motion_request(
+        mg.pose_goal(pose, 'panda_link8', 'world'),
         pipeline_id='pilz_industrial_motion_planner',
         planner_id='LIN',
         max_velocity_scaling_factor=0.2,
@@ -206,13 +196,13 @@ def test_cartesian_limits_of_the_package_bound_a_line(panda: MoveGroupRig) -> No
     assert 2.0 < duration(panda.plan(request)) < 2.6
 
 
-def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
+def test_the_gripper_of_the_package_is_moved(panda: mg.MoveGroupRig) -> None:
     """A GripperCommand with the joint that follows the other one in its list."""
     server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1')
     # MoveGroupInterface names joints that follow others, too
     for place, joints in ((0.03, FINGERS[:1]), (0.01, FINGERS)):
-        goal = joint_goal([place] * len(joints), joints)
-        _status, result = panda.move(action_goal(motion_request(goal, 'hand')))
+        goal = mg.joint_goal([place] * len(joints), joints)
+        _status, result = panda.move(mg.action_goal(mg.motion_request(goal, 'hand')))
         assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
         assert panda.followed[-1].command.position == pytest.approx(place)
         panda.settle()
@@ -226,47 +216,47 @@ def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
     _status, result = panda.run(ExecuteTrajectory, 'execute_trajectory', execute)
     assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
     assert panda.followed[-1].command.position == pytest.approx(0.03)
-    apart = joint_goal([0.01, 0.03], FINGERS)
-    _status, result = panda.move(action_goal(motion_request(apart, 'hand')))
+    apart = mg.joint_goal([0.01, 0.03], FINGERS)
+    _status, result = panda.move(mg.action_goal(mg.motion_request(apart, 'hand')))
     assert result.error_code.val == MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
     assert 'panda_finger_joint1 contradict' in result.error_code.message
     server.destroy()
 
 
-def held(rig: MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
+def held(rig: mg.MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
     """Have a controller begin with a goal; return its result to come, and how long it may last.
 
     The controller keeps it until the test has it go on.
     """
     rig.held.clear()
-    request = motion_request(goal, group, max_velocity_scaling_factor=1.0)
+    request = mg.motion_request(goal, group, max_velocity_scaling_factor=1.0)
     request.max_acceleration_scaling_factor = 1.0
     allowed = 1.2 * duration(rig.plan(request)) + 0.5  # moveit_controllers.yaml
-    handle = rig.send(MoveGroup, '/move_action', action_goal(request))
+    handle = rig.send(MoveGroup, '/move_action', mg.action_goal(request))
     result = handle.get_result_async()
     rig.client.spin_until(lambda: bool(rig.held) or result.done(), 60.0, 'goal of a controller')
     assert not result.done(), result.result().result.error_code
     return result, allowed
 
 
-def outcome(rig: MoveGroupRig, result: Any) -> int:
+def outcome(rig: mg.MoveGroupRig, result: Any) -> int:
     """Let the controller that holds end; return the code of the result."""
     rig.held[0].execute()
     rig.client.spin_until(result.done, 60.0, 'result')
     return int(result.result().result.error_code.val)
 
 
-def test_a_gripper_takes_the_time_that_it_needs(panda: MoveGroupRig) -> None:
+def test_a_gripper_takes_the_time_that_it_needs(panda: mg.MoveGroupRig) -> None:
     """It closes until it stalls, and a cancel would end its grip."""
     server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1', holds=True)
-    result, allowed = held(panda, joint_goal([0.02], ['panda_finger_joint1']), 'hand')
+    result, allowed = held(panda, mg.joint_goal([0.02], ['panda_finger_joint1']), 'hand')
     panda.client.spin_for(allowed + 1.0)
     assert not panda.held[0].is_cancel_requested
     assert outcome(panda, result) == MoveItErrorCodes.SUCCESS
     server.destroy()
 
 
-def test_the_state_of_a_controller_says_how_long_it_may_take(panda: MoveGroupRig) -> None:
+def test_the_state_of_a_controller_says_how_long_it_may_take(panda: mg.MoveGroupRig) -> None:
     """Paused, or held up and going on, it is waited for; at full speed it is too slow.
 
     So is one that leaves the factor at 0, as many releases of joint_trajectory_controller do.
@@ -286,7 +276,7 @@ def test_the_state_of_a_controller_says_how_long_it_may_take(panda: MoveGroupRig
     panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
 
     def begun() -> tuple[Any, float]:
-        return held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+        return held(panda, mg.joint_goal([0.1], mg.JOINTS[:1]), 'panda_arm')
 
     def is_canceled() -> bool:
         return bool(panda.held[0].is_cancel_requested)
@@ -313,21 +303,21 @@ def test_the_state_of_a_controller_says_how_long_it_may_take(panda: MoveGroupRig
     server.destroy()
 
 
-def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGroupRig) -> None:
+def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: mg.MoveGroupRig) -> None:
     """A goal behind a wall, for which a minute is allowed."""
     wall = box('wall', 0.0, 0.0, 0.0)
     sizes = [1.1, 0.02, 1.0], [1.1, 0.02, 1.0], [2.5, 2.5, 0.02]
     wall.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=each) for each in sizes]
     places = (0.69, 0.0, 0.5), (-0.7, 0.0, 0.5), (0.0, 0.0, 0.8)
     wall.primitive_poses = [pose_at(*each) for each in places]
-    panda.positions[JOINTS[0]] = 1.2
+    panda.positions[mg.JOINTS[0]] = 1.2
     panda.settle()
     panda.add(wall)
-    request = motion_request(joint_goal([-1.2, *READY[1:]]))
+    request = mg.motion_request(mg.joint_goal([-1.2, *mg.READY[1:]]))
     request.allowed_planning_time = 60.0
-    handle = panda.send(MoveGroup, '/move_action', action_goal(request, plan_only=True))
+    handle = panda.send(MoveGroup, '/move_action', mg.action_goal(request, plan_only=True))
     result = handle.get_result_async()
-    hand = motion_request(joint_goal([0.02], ['panda_finger_joint1']), 'hand')
+    hand = mg.motion_request(mg.joint_goal([0.02], ['panda_finger_joint1']), 'hand')
     asked = GetMotionPlan.Request(motion_plan_request=hand)
     plan = panda.client.call_async(GetMotionPlan, '/plan_kinematic_path', asked)
     panda.client.spin_until(plan.done, 20.0, 'plan of the hand')
@@ -340,7 +330,7 @@ def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGrou
     panda.reset()
 
 
-def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:
+def test_the_log_has_what_is_without_effect_once(panda: mg.MoveGroupRig) -> None:
     """And nothing that has one."""
     (line,) = (line for line in panda.process.lines if 'without effect' in line)
     names = re.sub(r'.*here: ', '', line).split(', ')
@@ -373,8 +363,8 @@ def test_keys_without_effect_are_named(
     tmp_path: Path, name: str, old: str, new: str, words: str
 ) -> None:
     """With file and line; of tables of what the robot lacks with what there is."""
-    folder = moveit_package('panda', tmp_path)
-    robot = ['panda_arm', 'hand'], [*JOINTS, *FINGERS], MOVERS
+    folder = mg.moveit_package('panda', tmp_path)
+    robot = ['panda_arm', 'hand'], [*mg.JOINTS, *FINGERS], MOVERS
     path = folder / 'config' / f'{name}.yaml'
 
     def found(*others: str) -> list[str]:
@@ -392,13 +382,13 @@ def test_keys_without_effect_are_named(
 def test_the_prbts_package_starts(isolation: Isolation, tmp_path: Path) -> None:
     """With the least that an assistant wrote; limits of the description count."""
     joints = [f'prbt_joint_{number}' for number in range(1, 7)]
-    folder = moveit_package('prbt', tmp_path)
+    folder = mg.moveit_package('prbt', tmp_path)
     with (folder / 'config' / 'kinematics.yaml').open('a') as file:
         file.write('\nmanipulatr:\n  kinematics_solver_timeout: 0.1\n')
     at = dict.fromkeys(joints, 0.0)
-    with MoveGroupRig(isolation, '--moveit-config', str(folder), positions=at) as rig:
-        goal = joint_goal([0.5] * 6, joints)
-        request = motion_request(goal, 'manipulator', planner_id='SBLkConfigDefault')
+    with mg.MoveGroupRig(isolation, '--moveit-config', str(folder), positions=at) as rig:
+        goal = mg.joint_goal([0.5] * 6, joints)
+        request = mg.motion_request(goal, 'manipulator', planner_id='SBLkConfigDefault')
         assert duration(rig.plan(request)) > 0.3
         assert any("no group 'manipulatr'" in line for line in rig.process.lines)
 
@@ -407,20 +397,20 @@ def test_parameters_of_moveits_launch_files_do_the_same(
     isolation: Isolation, tmp_path: Path
 ) -> None:
     """The same names, flattened, without --moveit-config; execution can be forbidden."""
-    values = dict(read_package(moveit_package('panda', tmp_path)).parameters)
+    values = dict(read_package(mg.moveit_package('panda', tmp_path)).parameters)
     for name in [each for each in values if each.startswith('kinect') or each == 'sensors']:
         del values[name]
     values |= {'publish_planning_scene': True, 'capabilities': '', 'monitor_dynamics': False}
     values['allow_trajectory_execution'] = False
     path = tmp_path / 'launch_params.json'
     path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
-    with MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
-        request = motion_request(joint_goal(MOVED), planner_id='TRRTkConfigDefault')
+    with mg.MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
+        request = mg.motion_request(mg.joint_goal(MOVED), planner_id='TRRTkConfigDefault')
         slow = duration(rig.plan(request))
         request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 1.0
         assert slow > 2.0 * duration(rig.plan(request))
         rig.serve_arm('panda_arm_controller')
-        _status, result = rig.move(action_goal(request))
+        _status, result = rig.move(mg.action_goal(request))
         assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED
         assert 'allow_trajectory_execution' in result.error_code.message
         assert not rig.followed
@@ -439,7 +429,7 @@ def refusal(package: MoveItPackage | None, *arguments: str) -> str:
 
 def test_what_does_not_fit_the_robot_is_refused(isolation: Isolation, tmp_path: Path) -> None:
     """With file and line, by the program itself."""
-    folder = moveit_package('panda', tmp_path)
+    folder = mg.moveit_package('panda', tmp_path)
     path = folder / 'config' / CONTROLLERS
     path.write_text(path.read_text().replace('- panda_joint7', '- panda_joint8', 1))
     text = refusal(read_package(folder))
@@ -452,7 +442,7 @@ def test_what_does_not_fit_the_robot_is_refused(isolation: Isolation, tmp_path: 
         process.wait_for(rf'{LIMITS}:\d+: .*panda_joint1.*21.75 is wider')
     limits = tmp_path / 'limits.yaml'  # of the parameter joint_limits
     limits.write_text('joint_limits: {elbow: {}}')
-    path = panda_parameters(tmp_path, joint_limits=limits)
+    path = mg.panda_parameters(tmp_path, joint_limits=limits)
     text = refusal(None, '--ros-args', '--params-file', str(path))
     words = rf'joint panda_joint1 is missing .*\(joint_limits: {re.escape(str(limits))}\)'
     assert re.search(words, text), text

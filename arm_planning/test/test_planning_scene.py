@@ -74,6 +74,7 @@ def test_path_constraints_are_those_that_clients_mean() -> None:
     wanted = pose_goal(pose, TIP, frame)
     (place,), (turn,) = wanted.position_constraints, wanted.orientation_constraints
     place.target_point_offset.z, turn.absolute_x_axis_tolerance = 0.1, 0.3
+    place.constraint_region.primitive_poses[0].orientation = quarter
     wanted.joint_constraints = joint_goal(
         [-2.2], [frame.replace('link', 'joint')]
     ).joint_constraints
@@ -92,6 +93,7 @@ def test_path_constraints_are_those_that_clients_mean() -> None:
         assert point.regions[0].pose.position == pytest.approx(there)
         about_x = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
         assert held.rotation == pytest.approx(link.rotation @ about_x)
+        assert point.regions[0].pose.rotation == pytest.approx(link.rotation @ about_x)
         assert held.tolerance.tolist() == [0.3, 1e-3, 1e-3]
 
 

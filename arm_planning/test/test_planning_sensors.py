@@ -11,16 +11,7 @@ from typing import Any
 from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import TransformStamped
 from isolation import reserve
-from move_group_rig import (
-    change,
-    HAND,
-    joint_goal,
-    motion_request,
-    MoveGroupRig,
-    panda_parameters,
-    pose_goal,
-    READY,
-)
+import move_group_rig as mg
 from moveit_msgs.msg import LinkPadding, MoveItErrorCodes, PlanningScene, PlanningSceneComponents
 from moveit_msgs.srv import GetStateValidity
 from planning_messages import box, pose_at
@@ -30,7 +21,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
 
-MOVED = [0.9, *READY[1:]]
+MOVED = [0.9, *mg.READY[1:]]
 EDGE = 0.08  # of the smallest cells in [m]
 
 
@@ -43,7 +34,7 @@ def one_block(depth: int = 16) -> bytes:
 
 def scene_with_map(x: float, z: float, data: bytes | None = None) -> PlanningScene:
     """Return a change that has an octomap with its one cell from a place on."""
-    scene = change()
+    scene = mg.change()
     message = scene.world.octomap
     message.header.frame_id = 'panda_link0'
     message.origin = PoseMessage()
@@ -55,20 +46,20 @@ def scene_with_map(x: float, z: float, data: bytes | None = None) -> PlanningSce
     return scene
 
 
-def touching(rig: MoveGroupRig) -> set[str]:
+def touching(rig: mg.MoveGroupRig) -> set[str]:
     """Return what the robot touches where it is."""
     request = GetStateValidity.Request(group_name='panda_arm')
     found = rig.client.call(GetStateValidity, '/check_state_validity', request).contacts
     return {body for each in found for body in (each.contact_body_1, each.contact_body_2)}
 
 
-def test_a_map_blocks_and_comes_back_as_it_was_sent(rig: MoveGroupRig) -> None:
+def test_a_map_blocks_and_comes_back_as_it_was_sent(rig: mg.MoveGroupRig) -> None:
     """The contact has MoveIt's name of it; only who asks for the octomap gets it."""
     monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
     sent = scene_with_map(0.307, 0.6)  # in the hand
     assert rig.apply(sent)
     assert '<octomap>' in touching(rig)
-    answer = rig.plan(motion_request(joint_goal(MOVED)))
+    answer = rig.plan(mg.motion_request(mg.joint_goal(MOVED)))
     assert answer.error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
     assert '<octomap>' in answer.error_code.message
     found = rig.scene(PlanningSceneComponents.OCTOMAP).world.octomap
@@ -87,28 +78,28 @@ def test_a_map_blocks_and_comes_back_as_it_was_sent(rig: MoveGroupRig) -> None:
     assert '<octomap>' in touching(rig)
 
 
-def test_motions_lead_around_a_map(rig: MoveGroupRig) -> None:
+def test_motions_lead_around_a_map(rig: mg.MoveGroupRig) -> None:
     """A cell on the straight way of the hand; padding of the links counts, as in MoveIt."""
     # 0.5 m beside the arm nothing touches; a padding of 0.45 m reaches it
     assert rig.apply(scene_with_map(0.8, 0.6))
-    padded = change(link_padding=[LinkPadding(link_name='panda_link7')])
+    padded = mg.change(link_padding=[LinkPadding(link_name='panda_link7')])
     for padding, touched in ((0.45, {'<octomap>', 'panda_link7'}), (0.0, set[str]())):
         padded.link_padding[0].padding = padding
         assert rig.apply(padded)
         assert touched <= touching(rig)
         assert bool(touching(rig)) == bool(touched)
-    assert rig.plan(motion_request(joint_goal(MOVED))).error_code.val == 1
+    assert rig.plan(mg.motion_request(mg.joint_goal(MOVED))).error_code.val == 1
     rig.positions['panda_joint1'] = -0.9
     assert rig.apply(scene_with_map(0.307, 0.6))
     rig.client.spin_until(lambda: '<octomap>' not in touching(rig), 30.0, 'the arm beside the map')
-    answer = rig.plan(motion_request(joint_goal(MOVED)))
+    answer = rig.plan(mg.motion_request(mg.joint_goal(MOVED)))
     assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
     # the straight motion would turn joint 1 alone
     rows = [each.positions for each in answer.trajectory.joint_trajectory.points]
-    assert max(abs(row[1] - READY[1]) + abs(row[3] - READY[3]) for row in rows) > 0.05
+    assert max(abs(row[1] - mg.READY[1]) + abs(row[3] - mg.READY[3]) for row in rows) > 0.05
 
 
-def test_broken_maps_are_refused_and_leave_the_scene(rig: MoveGroupRig) -> None:
+def test_broken_maps_are_refused_and_leave_the_scene(rig: mg.MoveGroupRig) -> None:
     """With the reason in the log."""
     assert rig.apply(scene_with_map(0.8, 0.6))
     before = rig.scene().world.octomap
@@ -154,7 +145,7 @@ class Camera:
         rig: move_group and its client.
     """
 
-    def __init__(self, rig: MoveGroupRig, prefix: str = '') -> None:
+    def __init__(self, rig: mg.MoveGroupRig, prefix: str = '') -> None:
         self.rig = rig
         node = rig.client.node
         self._moving = node.create_publisher(TFMessage, '/tf', 100)
@@ -167,7 +158,7 @@ class Camera:
         transforms = [
             transform('map', f'{prefix}panda_link0', -1.0),
             transform('map', 'table', 1.0, 0.5),
-            transform(f'{prefix}{HAND}', 'camera_on_hand', 0.0, 0.1),
+            transform(f'{prefix}{mg.HAND}', 'camera_on_hand', 0.0, 0.1),
         ]
         static.publish(TFMessage(transforms=transforms))
 
@@ -180,7 +171,7 @@ class Camera:
 
     def ik(self, frame: str, x: float, z: float) -> Any:
         """Return the response to compute_ik for a pose in a frame."""
-        return self.rig.ik(down(x, z), frame, ik_link_name=HAND)
+        return self.rig.ik(down(x, z), frame, ik_link_name=mg.HAND)
 
     def hand(self, frame: str, x: float, z: float) -> tuple[float, ...]:
         """Return where the hand is in the solution for a pose in a frame; () if it is unknown."""
@@ -189,18 +180,18 @@ class Camera:
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
             return ()
-        place = self.rig.fk(HAND, answer.solution).position
+        place = self.rig.fk(mg.HAND, answer.solution).position
         return place.x, place.y, place.z
 
 
 @pytest.fixture(name='one_camera', scope='module')
-def make_camera(running_rig: MoveGroupRig) -> Camera:
+def make_camera(running_rig: mg.MoveGroupRig) -> Camera:
     """Return the camera."""
     return Camera(running_rig)
 
 
 @pytest.fixture(name='camera')
-def in_empty_scene(one_camera: Camera, rig: MoveGroupRig) -> Camera:
+def in_empty_scene(one_camera: Camera, rig: mg.MoveGroupRig) -> Camera:
     """Return the camera, in an empty scene."""
     assert one_camera.rig is rig
     return one_camera
@@ -213,13 +204,13 @@ def test_poses_are_taken_in_frames_of_tf(camera: Camera) -> None:
         lambda: camera.hand('camera_link', 1.5, 0.0) == SEEN, 60.0, 'a solution for the camera'
     )
     for frame, pose, link, code in (
-        ('camera_link', down(1.5, 0.0), HAND, MoveItErrorCodes.SUCCESS),
-        ('camera_on_hand', PoseMessage(), HAND, MoveItErrorCodes.SUCCESS),
+        ('camera_link', down(1.5, 0.0), mg.HAND, MoveItErrorCodes.SUCCESS),
+        ('camera_on_hand', PoseMessage(), mg.HAND, MoveItErrorCodes.SUCCESS),
         # a frame of TF is no link of a goal: it would be one that stands still
         ('panda_link0', down(0.5, 0.5), 'table', MoveItErrorCodes.INVALID_LINK_NAME),
     ):
         camera.see()
-        answer = rig.plan(motion_request(pose_goal(pose, link, frame)))
+        answer = rig.plan(mg.motion_request(mg.pose_goal(pose, link, frame)))
         assert answer.error_code.val == code, answer.error_code
     thing = box('cup', 1.4, 0.3, 0.0)
     thing.header.frame_id = 'camera_link'
@@ -246,15 +237,17 @@ def test_old_and_unknown_frames_are_refused(camera: Camera) -> None:
         )
 
     camera.rig.client.spin_until(is_old, 60.0, 'refusal of an old frame')
-    answer = camera.rig.plan(motion_request(pose_goal(down(1.5, 0.0), HAND, 'camera_link')))
+    answer = camera.rig.plan(
+        mg.motion_request(mg.pose_goal(down(1.5, 0.0), mg.HAND, 'camera_link'))
+    )
     assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
 
 
 def test_links_have_a_prefix_in_tf(tmp_path: Path) -> None:
     """Of a robot in a namespace; a frame that names a link may have it, too."""
-    path = str(panda_parameters(tmp_path))
+    path = str(mg.panda_parameters(tmp_path))
     arguments = ['--ros-args', '--params-file', path, '-p', 'frame_prefix:=left/']
-    with reserve() as isolation, MoveGroupRig(isolation, *arguments) as rig:
+    with reserve() as isolation, mg.MoveGroupRig(isolation, *arguments) as rig:
         camera = Camera(rig, 'left/')
         rig.client.spin_until(
             lambda: camera.hand('camera_link', 1.5, 0.0) == SEEN, 60.0, 'the camera'
