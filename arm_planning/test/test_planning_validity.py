@@ -265,8 +265,10 @@ def test_a_touch_in_passing_is_found(angle: float) -> None:
     check = ValidityCheck(model.limits, scene)
     assert check.near(begin, end, check.required(begin, end)) is not None
     path = path_to(model, begin, end)
-    for found in (check.waypoints(np.array(SWING)), check.path(path)):
-        assert found is not None
-        assert 'wire' in found.reason
+    between, found = check.waypoints(np.array(SWING)), check.path(path)
+    assert between is not None
+    assert found is not None
+    assert 'wire' in between.reason
+    assert 'wire' in found.reason
     assert 0.0 < found.time < path.duration
     assert np.allclose(path.at(found.time).position, found.positions)
