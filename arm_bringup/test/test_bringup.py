@@ -29,24 +29,22 @@ def test_what_comes_next_is_proposed() -> None:
 
     A target is absolute, so no arm on hardware gets one proposed.
     """
-    arm, none = ['arm_controller'], list[str]()
-    first = '    ros2 service call /shoulder/init std_srvs/srv/Trigger # and of the others'
+    arm, first = ['arm_controller'], '/shoulder/init std_srvs/srv/Trigger # and of the others'
     target = 'ros2 service call /shoulder/target canopen_interfaces/srv/COTargetDouble'
-    for lines, controllers, namespace, enabled, simulated, planned in (
-        ({'/left/arm_controller/follow_joint_trajectory', '-r __ns:=/left'}, arm, 'left', 1, 0, 0),
-        ({first, '--enable enables', '/move_action', 'servo_keyboard_input'}, arm, '', 0, 1, 1),
-        ({target, '{ target: 0.1 }', '/joint_states'}, none, '', 1, 1, 0),
-        ({'echo --once /joint_states'}, none, '', 1, 0, 0),
+    for namespace, controllers, flags, lines in (
+        ('left', arm, 'enabled', ['/left/arm_controller/follow_joint_traj', '-r __ns:=/left']),
+        ('', arm, 'simulated planned', [first, '--enable enables', '/move_action']),
+        ('', [], 'enabled simulated', [target, '{ target: 0.1 }', '/joint_states']),
+        ('', [], 'enabled', ['echo --once /joint_states']),
     ):
-        ros = RosOptions(namespace)
-        fields = {'simulated': bool(simulated), 'planned': bool(planned)}
-        text = next_commands(DRIVES, MODE, controllers, ros, enabled=bool(enabled), **fields)
+        fields = {name: name in flags for name in ('enabled', 'simulated', 'planned')}
+        text = next_commands(DRIVES, MODE, controllers, RosOptions(namespace), **fields)
         assert text.startswith('in a second terminal')
-        assert {line for line in lines if line not in text} == set(), text
-        assert ('/init' in text) == (not enabled)
-        assert ('/target' in text) == (simulated and not controllers)
+        assert [line for line in lines if line not in text] == [], text
+        assert ('/init' in text) == (not fields['enabled'])
+        assert ('/target' in text) == (fields['simulated'] and not controllers)
         assert ('servo_keyboard' in text) == bool(controllers)
-        assert ('/move_action' in text) == bool(planned)
+        assert ('/move_action' in text) == fields['planned']
 
 
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'

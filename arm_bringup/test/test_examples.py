@@ -14,7 +14,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from rich.console import Console
 from urdf_reader import JointRange
 
 from arm_bringup.examples.arm import ArmDemo
-from arm_bringup.examples.wave import Axis, MAX_VELOCITY, quintic_step
+from arm_bringup.examples.wave import Axis, MAX_VELOCITY
 from arm_bringup.robots import WaveError
 from arm_bringup.session import locate
 
@@ -36,15 +36,6 @@ limits = st.builds(
     st.floats(0.01, 12),
     st.floats(0.05, 8),
 )
-
-
-@given(st.floats(0, 1), st.floats(1e-4, 0.1))
-@example(0.9999999999999999, 0.0625)
-def test_the_step_has_a_bounded_slope(x: float, d: float) -> None:
-    """It rises from 0 to 1 and never passes either, also across its ends."""
-    before, after = quintic_step(x), quintic_step(x + d)
-    assert 0.0 <= before <= 1.0
-    assert -1e-15 <= after - before <= 15 / 8 * d * (1 + 1e-9) + 1e-15
 
 
 @given(limits, st.floats(-1, 1))
@@ -76,20 +67,6 @@ def test_a_joint_that_cannot_swing_is_refused_by_name() -> None:
     assert wheel.centre == 0.0
     assert 0 < wheel.amplitude < 1.0
     assert Axis(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0).velocity == MAX_VELOCITY
-
-
-def test_speed_is_that_of_the_cycles_however_late_they_are() -> None:
-    """Set-points are those of the nominal times."""
-    motion = pytest.importorskip('arm_bringup.examples.motion')
-    one = np.zeros(1)
-    tools = [np.array([0.001 * count, 0.0, 0.0]) for count in range(5)]
-    some = [
-        motion.Sample(0.01 * count + 0.002 * (count % 2), one, one, one, 1.0, tool, tool)
-        for count, tool in enumerate(tools)
-    ]
-    assert motion.tool_speed(some, 0.01) == pytest.approx(0.1)
-    off = motion.off_line(tools, tools[0], np.array([1.0, 1.0, 0]))
-    assert off == pytest.approx(0.004 / math.sqrt(2))
 
 
 @pytest.mark.parametrize('name', ['panda_hand', 'prbt', 'gp110'])

@@ -15,17 +15,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 import yaml
 
+from arm_bringup import session
 from arm_bringup.groups import motion_files, MovedGroups, planning_files
 from arm_bringup.robots import Robot
-from arm_bringup.session import (
-    arm_processes,
-    choose_master,
-    controller_process,
-    MAKE_MOVE,
-    MASTER,
-    MOTION_NODE,
-    Stack,
-)
 from node_runner import init_ros
 from process_supervisor import EVERY_NODE, ProcessSpec, RosOptions, StartError
 
@@ -58,10 +50,10 @@ def underlay(folder: Path, *packages: str) -> FindExecutable:
     return find
 
 
-def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSpec]:
+def processes(folder: Path, stack: session.Stack, *packages: str) -> dict[str, ProcessSpec]:
     """Plan a stack on an underlay with arm_canopen and more."""
     find = underlay(folder, 'arm_canopen', 'arm_bringup', 'canopen_sim', *packages)
-    return {spec.name: spec for spec in arm_processes(stack, PARAMETERS, find)}
+    return {spec.name: spec for spec in session.arm_processes(stack, PARAMETERS, find)}
 
 
 def parameter_files(spec: ProcessSpec) -> list[Path]:
@@ -76,7 +68,7 @@ def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
     """
     own = {'diagnostics_period': '0.2'}
     fields: dict[str, Any] = {'master_parameters': own, 'master_files': FILES, 'simulate': True}
-    stack = Stack(ROBOT, 'can0', master=MOTION_NODE, **fields)
+    stack = session.Stack(ROBOT, 'can0', master=session.MOTION_NODE, **fields)
     found = processes(tmp_path, stack, 'arm_servo')
     assert set(found) == {'slaves', 'master'}
     argv = found['master'].argv
@@ -97,12 +89,14 @@ def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
 def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) -> None:
     """It comes behind all parameters and files of the bring-up."""
     ros = RosOptions('left', words)
-    stack = Stack(ROBOT, 'can0', True, master=MOTION_NODE, master_files=FILES, ros=ros)
+    stack = session.Stack(
+        ROBOT, 'can0', True, master=session.MOTION_NODE, master_files=FILES, ros=ros
+    )
     names = ('arm_canopen', 'arm_bringup', 'arm_servo', 'canopen_sim', 'robot_viewer')
     find = underlay(tmp_path, *names)
     specs = [
-        *arm_processes(stack, PARAMETERS, find),
-        controller_process(FILES, PARAMETERS, 1.0, find, ros),
+        *session.arm_processes(stack, PARAMETERS, find),
+        session.controller_process(FILES, PARAMETERS, 1.0, find, ros),
     ]
     assert len(specs) == 4
     assert {spec.argv[-2:] for spec in specs} == {words}
@@ -122,7 +116,7 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
     ros = RosOptions(namespace, tuple(said))
     files = motion_files(robot, tmp_path, ros, MovedGroups(('arm',)))
     find = underlay(tmp_path, 'arm_servo')
-    argv = controller_process(files[:-1], files[-1], 1.0, find, ros).argv
+    argv = session.controller_process(files[:-1], files[-1], 1.0, find, ros).argv
     context = Context()
     init_ros(argv, context)
     node = Node('servo_node', context=context)
@@ -136,14 +130,14 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     robot = my_robot(tmp_path)
     bare = underlay(tmp_path, 'arm_canopen')
     full = underlay(tmp_path, 'arm_canopen', 'arm_servo')
-    assert choose_master(robot, bare) == (MASTER, MAKE_MOVE)
-    assert choose_master(robot, full)[0] == MASTER
-    assert 'lacks my.srdf and limits.yaml' in choose_master(robot, full)[1]
+    assert session.choose_master(robot, bare) == (session.MASTER, session.MAKE_MOVE)
+    assert session.choose_master(robot, full)[0] == session.MASTER
+    assert 'lacks my.srdf and limits.yaml' in session.choose_master(robot, full)[1]
     robot.limits.touch()
-    assert 'my lacks my.srdf for' in choose_master(robot, full)[1]
+    assert 'my lacks my.srdf for' in session.choose_master(robot, full)[1]
     srdf = '<robot name="my"><group name="arm"/></robot>'
     robot.semantic.write_text(srdf)
-    assert choose_master(robot, full) == (MOTION_NODE, '')
+    assert session.choose_master(robot, full) == (session.MOTION_NODE, '')
     (file,) = motion_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
     assert (values['robot_description_semantic'], values['group']) == (srdf, 'arm')
@@ -152,7 +146,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
 
 def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> None:
     """Everything else is the same. The master disables the drives, so it stops before them."""
-    plain = Stack(ROBOT, 'can0', simulate=True)
+    plain = session.Stack(ROBOT, 'can0', simulate=True)
     without = processes(tmp_path, plain, 'robot_viewer')
     seen = processes(tmp_path, replace(plain, view=True), 'robot_viewer')
     viewer = seen.pop('viewer')
@@ -168,7 +162,7 @@ def test_the_public_robot_state_publisher_runs_where_it_is_installed(
     tmp_path: Path, packages: list[str]
 ) -> None:
     """Ours elsewhere, which says when it is ready; it is no reason to end when it dies."""
-    stack = Stack(ROBOT, 'can0', simulate=True)
+    stack = session.Stack(ROBOT, 'can0', simulate=True)
     publisher = processes(tmp_path, stack, *packages)['robot_state']
     assert not publisher.required
     assert publisher.notifies_ready == (packages[-1] == 'robot_viewer')

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
-import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -77,13 +77,14 @@ def tetrahedron(size: float) -> MeshMessage:
 
 @st.composite
 def poses(draw: Any) -> PoseMessage:
-    """Any pose near the robot; the scalar part of the quaternion is not negative."""
+    """Any pose near the robot."""
     numbers = np.array([draw(NUMBERS) for _ in range(4)])
     if np.linalg.norm(numbers) < 0.1:
         numbers = np.array([0.0, 0.0, 0.0, 1.0])
     x, y, z, w = (numbers / np.linalg.norm(numbers)).tolist()
-    place = Point(x=draw(NUMBERS), y=draw(NUMBERS), z=draw(NUMBERS))
-    return PoseMessage(position=place, orientation=Quaternion(x=x, y=y, z=z, w=w))
+    pose = pose_at(draw(NUMBERS), draw(NUMBERS), draw(NUMBERS))
+    pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
+    return pose
 
 
 def _primitives(kind: int, count: int) -> st.SearchStrategy[SolidPrimitive]:
@@ -121,34 +122,29 @@ def objects(draw: Any, name: str = 'thing') -> ObjectMessage:
     return message
 
 
-def numbers_of(message: Any) -> list[float]:
-    """Return all numbers of a message, quaternions without their sign."""
-    found: list[float] = []
+def leaves(message: Any) -> Iterator[float | str]:
+    """Yield all numbers and texts of a message, quaternions without their sign."""
     if isinstance(message, Quaternion):
         numbers = np.array([message.x, message.y, message.z, message.w])
         clear = numbers[np.abs(numbers) > 0.123]  # rounding turns the sign of none of these
-        return list(numbers * np.sign(clear[0]))
-    if hasattr(message, 'get_fields_and_field_types'):
+        yield from (numbers * np.sign(clear[0])).tolist()
+    elif hasattr(message, 'get_fields_and_field_types'):
         for field in message.get_fields_and_field_types():
-            found += numbers_of(getattr(message, field))
+            yield from leaves(getattr(message, field))
+    elif isinstance(message, str):
+        yield message
     elif isinstance(message, (bool, int, float, np.number)):
-        found.append(float(message))
-    elif not isinstance(message, (str, bytes)):
+        yield float(message)
+    elif not isinstance(message, bytes):
         for each in message:
-            found += numbers_of(each)
-    return found
+            yield from leaves(each)
 
 
-def texts_of(message: Any) -> str:
+def numbers_of(message: Any) -> list[float]:
+    """Return all numbers of a message."""
+    return [each for each in leaves(message) if not isinstance(each, str)]
+
+
+def texts_of(message: Any) -> list[str]:
     """Return all texts of a message."""
-
-    def texts(part: Any) -> Any:
-        if hasattr(part, 'get_fields_and_field_types'):
-            return [texts(getattr(part, field)) for field in part.get_fields_and_field_types()]
-        if isinstance(part, str):
-            return part
-        if isinstance(part, (bytes, bool, int, float, np.number)):
-            return None
-        return [texts(each) for each in part]
-
-    return json.dumps(texts(message))
+    return [each for each in leaves(message) if isinstance(each, str)]

@@ -14,16 +14,7 @@ import numpy as np
 from planning_scenes import distances
 import pytest
 
-from arm_model import (
-    Array,
-    CollisionObject,
-    frozen,
-    JointLimits,
-    Plane,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+import arm_model as am
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ik import IkSolver
 from arm_planning.link_kinematics import pose_error
@@ -41,12 +32,12 @@ def solver(name: str) -> IkSolver:
     return IkSolver(robot(name))
 
 
-def drawn(limits: JointLimits, seed: int) -> Array:
+def drawn(limits: am.JointLimits, seed: int) -> am.Array:
     """Return random positions within limits."""
     return np.random.default_rng(seed).uniform(*limits.span(np.zeros(len(limits))))
 
 
-def meets(inverse: IkSolver, pose: Pose, positions: Array, tolerance: float) -> bool:
+def meets(inverse: IkSolver, pose: am.Pose, positions: am.Array, tolerance: float) -> bool:
     """Whether forward kinematics lead to a pose."""
     error = pose_error(pose, inverse.link.pose(positions))
     return bool(np.abs(error).max() <= tolerance)
@@ -144,14 +135,14 @@ def test_why_nothing_is_found_is_said(name: str) -> None:
     """How far it is out of reach; a joint beyond its limits; what touches in every solution."""
     inverse, here, limits = solver(name), ready(name), table(name)
     pose = inverse.link.pose(here)
-    far = Pose(pose.rotation, pose.position + np.array([9.0, 0.0, 0.0]))
-    ball = robot(name).scene.with_object(CollisionObject('ball', Sphere(0.2), pose=pose))
+    far = am.Pose(pose.rotation, pose.position + np.array([9.0, 0.0, 0.0]))
+    ball = robot(name).scene.with_object(am.CollisionObject('ball', am.Sphere(0.2), pose=pose))
     for joint, position in zip(robot(name).joints, here.tolist(), strict=True):
         narrow = {'min_position': position - 0.05, 'max_position': position + 0.05}
         limits[joint] = {**limits[joint], 'has_position_limits': True, **narrow}
     moved = here.copy()
     moved[:2] += 0.3
-    narrowed = RobotModel(*texts(name), limits)
+    narrowed = am.RobotModel(*texts(name), limits)
     joints = '|'.join(narrowed.joints)
     for words, solve in (
         (r'out of reach by [5-9]\.\d{3} m', partial(inverse.solve, far, here)),
@@ -174,7 +165,7 @@ def test_solutions_in_contact_are_left_out(name: str, seed: int) -> None:
     inverse, model = solver(name), robot(name)
     positions = drawn(model.limits, seed)
     pose = inverse.link.pose(positions)
-    floor = model.scene.with_object(CollisionObject('floor', Plane(offset=-0.3)))
+    floor = model.scene.with_object(am.CollisionObject('floor', am.Plane(offset=-0.3)))
     every = inverse.solve(pose, positions)
     free = [each for each in every if distances(floor, each).min() >= 0.0]
     if free:
@@ -189,7 +180,7 @@ def test_time_out_is_that_of_the_clock() -> None:
     ticks = count(0.0, 1.0)
     inverse = IkSolver(robot('panda'), clock=lambda: next(ticks))
     pose = inverse.link.pose(ready('panda'))
-    far = Pose(pose.rotation, pose.position + np.array([3.0, 0.0, 0.0]))
+    far = am.Pose(pose.rotation, pose.position + np.array([3.0, 0.0, 0.0]))
     with pytest.raises(PlanningError, match='in 3 starts'):
         inverse.solve(far, ready('panda'), timeout=2.5)
     assert inverse.solve(pose, ready('panda'), timeout=0.0)
@@ -200,8 +191,8 @@ def test_what_is_no_pose_is_refused() -> None:
     inverse, here = solver('prbt'), ready('prbt')
     pose = inverse.link.pose(here)
     for words, wanted, seed in (
-        ('finite', Pose(pose.rotation, frozen([0.0, np.nan, 0.0])), here),
-        ('mirror', Pose(-np.eye(3), pose.position), here),
+        ('finite', am.Pose(pose.rotation, am.frozen([0.0, np.nan, 0.0])), here),
+        ('mirror', am.Pose(-np.eye(3), pose.position), here),
         ('seed', pose, here[:1]),
     ):
         with pytest.raises(PlanningError, match=words):

@@ -190,6 +190,8 @@ def test_circ_stays_on_its_arc(name: str, seed: int, center: bool) -> None:
         arc = arc_through(begin, via.position, goal)
     for share in (0.2, 0.8):
         assert arc.at(share).position == pytest.approx(on_circle(share * sweep), abs=1e-6)
+        before, after = (arc.at(share + shift).position for shift in (-1e-6, 1e-6))
+        assert arc.twist(share)[:3] == pytest.approx((after - before) / 2e-6, abs=1e-6)
     found = planned(name, request(name, 'CIRC', goal, via=via))
     assume(found is not None)
     assert found is not None
@@ -429,3 +431,12 @@ def test_circles_that_are_none_have_the_codes_of_pilz() -> None:
         with pytest.raises(PlanningError, match=words) as refused:
             motion('prbt', request('prbt', 'CIRC', goal, via=via))
         assert refused.value.code is CODE.INVALID_MOTION_PLAN, words
+
+
+def test_cartesian_limits_are_checked() -> None:
+    """Of a file of Pilz: other keys are passed over, what is wrong is named."""
+    table = {'max_trans_vel': 0.5, 'max_trans_dec': -1, 'max_rot_acc': 9.0}
+    assert CartesianLimits.of_table(table) == CartesianLimits(0.5, max_trans_dec=-1.0)
+    for wrong in ({'max_rot_vel': 0.0}, {'max_trans_dec': 5.0}, {'max_trans_acc': 'fast'}):
+        with pytest.raises(PlanningError, match='cartesian_limits'):
+            CartesianLimits.of_table(wrong)

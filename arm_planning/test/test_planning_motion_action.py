@@ -20,13 +20,7 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros.actions import (
-    ExecuteAction,
-    MotionAction,
-    REPLAN_ATTEMPTS,
-    sequence,
-    single_motion,
-)
+from arm_planning.ros import actions
 from arm_planning.ros.background import Background
 from arm_planning.ros.execution import Done, INVALIDATED
 from arm_planning.ros.planning import PlannedMotion
@@ -59,10 +53,13 @@ class Bench:
         execution: Any = SimpleNamespace(start=self._start, stop=self._stop, stops=0)
         self.execution = execution
         self.actions = [
-            ExecuteAction(client.node, execution),
+            actions.ExecuteAction(client.node, execution),
             *(
-                MotionAction(client.node, kind, planning, self.background, execution)
-                for kind in (single_motion(planning, self.warnings.append), sequence(planning))
+                actions.MotionAction(client.node, kind, planning, self.background, execution)
+                for kind in (
+                    actions.single_motion(planning, self.warnings.append),
+                    actions.sequence(planning),
+                )
             ),
         ]
 
@@ -151,7 +148,7 @@ def test_a_motion_that_is_not_clear_any_more_is_planned_anew_once(
     handle = bench.move(delay=delay)
     if busy:  # longer than its period: it is due again and again, as the delay is
         bench.client.node.create_timer(0.005, partial(time.sleep, 0.01))
-    for number in range(1, REPLAN_ATTEMPTS):
+    for number in range(1, actions.REPLAN_ATTEMPTS):
         bench.executions[-1](INVALIDATED, 'the scene has changed')
         bench.wait_for_execution(number + 1)
         bench.client.spin_for(0.1)  # five delays

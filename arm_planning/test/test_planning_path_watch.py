@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any
@@ -72,33 +71,22 @@ def test_an_object_ahead_is_seen_and_one_behind_is_not() -> None:
         assert contact_ahead(trajectory, here, EMPTY.scene) == ''
 
 
-class Executions:
-    """Executions that the test begins, and what was stopped of them."""
-
-    def __init__(self) -> None:
-        self.running: list[Execution] = []
-        self.stopped: list[tuple[Execution, PlanningCode, str]] = []
-        self.on_start: Callable[[], None] = lambda: None
-
-    def start(self, trajectory: JointTrajectory) -> Execution:
-        """Have a trajectory on its way."""
-        execution = Execution(trajectory, lambda *_: None, way=trajectory)
-        self.running = [*self.running, execution]
-        self.on_start()
-        return execution
-
-    def stop(self, execution: Execution, code: PlanningCode, reason: str) -> None:
-        """Stop one."""
-        self.running = [each for each in self.running if each is not execution]
-        self.stopped.append((execution, code, reason))
-
-
 def test_what_begins_in_a_scene_that_has_changed_meanwhile_is_stopped() -> None:
     """Also where a look at what had begun before is not done yet."""
     monitor = SimpleNamespace(snapshot=SimpleNamespace(scene=crate_at(0.9)))
     monitor.positions = lambda: places(READY)
-    executions, work = Executions(), list[tuple[Any, Any]]()
+    work, stopped = list[tuple[Any, Any]](), list[tuple[Execution, PlanningCode, str]]()
     later = SimpleNamespace(submit=lambda *each: work.append(each))
+
+    def stop(execution: Execution, code: PlanningCode, reason: str) -> None:
+        executions.running = [each for each in executions.running if each is not execution]
+        stopped.append((execution, code, reason))
+
+    def start() -> Execution:
+        execution = Execution(motion(), lambda *_: None, way=motion())
+        executions.running = [*executions.running, execution]
+        executions.on_start()
+        return execution
 
     def look() -> None:
         while work:
@@ -107,17 +95,18 @@ def test_what_begins_in_a_scene_that_has_changed_meanwhile_is_stopped() -> None:
             done.set_result(task())
             then(done)
 
+    executions: Any = SimpleNamespace(running=[], stop=stop)
     PathWatch(monitor, executions, later)  # type: ignore[arg-type]
-    started = [executions.start(motion()), executions.start(motion())]
+    started = [start(), start()]
     look()
-    assert [each for each, _, _ in executions.stopped] == started
-    for _, code, reason in executions.stopped:
+    assert [each for each, _, _ in stopped] == started
+    for _, code, reason in stopped:
         assert code is INVALIDATED
         assert 'crate' in reason
     monitor.snapshot.scene = EMPTY.scene
-    executions.start(motion())
+    start()
     look()
-    assert len(executions.stopped) == len(started)
+    assert len(stopped) == len(started)
 
 
 @pytest.mark.parametrize('kinds', ['va', 'v', ''])
