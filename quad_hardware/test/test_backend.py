@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 import json
@@ -24,7 +24,7 @@ from quad_hardware.backend import recorded_in, ReplayedRobot, SerialBackend
 from quad_hardware.estimation import EstimatorSettings, ImuMounting
 from quad_hardware.joints import JointMap, LimiterSettings, MAX_PERIOD, servo_of
 from quad_hardware.link import LinkOptions, LinkState
-from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
+from quad_hardware.protocol import BULK_READ_ORDER, LEG_MOTORS, MOTOR_ORDER, Protocol, V1, V2
 from quad_hardware.recording import read_serial_log
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
@@ -226,16 +226,47 @@ def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
     assert {m: peer.angles[m] for m in LEG_MOTORS} == pytest.approx(wanted, abs=1.0)
 
 
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Wait for something."""
+    deadline = time.monotonic() + TIMEOUT
+    while not condition():
+        assert time.monotonic() < deadline, f'no {what}'
+        time.sleep(0.02)
+
+
+def test_torque_comes_back_where_the_arm_is(peer: PtyPeer) -> None:
+    """Each reported servo gets its own position as target before it wakes; an arm would snap."""
+    urdf = robot_urdf('lite', arm=True)
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), urdf, joints))
+    moved = pytest.approx((math.radians(20.0),) * 12, abs=0.02)
+
+    def is_moved() -> bool:
+        sample = robot.latest and robot.latest.joints
+        return bool(sample and sample.positions[:12] == moved)
+
+    robot.start()
+    try:
+        wait_for(lambda: robot.set_torque(on=False), 'robot')
+        wait_for(lambda: not peer.torque, 'torque off')
+        peer.angles.update(dict.fromkeys(peer.angles, 20.0))
+        wait_for(is_moved, 'report of where it was put')
+        assert robot.set_torque(on=True)
+        wait_for(lambda: peer.torque, 'torque on')
+    finally:
+        robot.end(print)
+    targets = {motor: angle for angles in peer.commands for motor, angle in angles.items()}
+    reported = MOTOR_ORDER if peer.protocol is V2 else BULK_READ_ORDER
+    assert targets == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
+
+
 @pytest.mark.parametrize('peer', [V2], indirect=True)
 def test_commands_that_could_not_leave_add_up_to_no_jump(peer: PtyPeer) -> None:
     """A computer that holds up only the thread of the line sends the newest, one step on."""
     robot = SerialRobot(settings_at(peer.link))
     robot.start()
-    deadline = time.monotonic() + 10.0
     try:
-        while not robot.command([0.0] * 12):
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait_for(lambda: robot.command([0.0] * 12), 'robot')
         held = iter([0.4])
         for tick in range(60):
             if tick == 20:
@@ -260,6 +291,7 @@ def test_what_is_no_command_is_refused(peer: PtyPeer) -> None:
     assert peer.commands == []
 
 
+@pytest.mark.parametrize('peer', [V2], indirect=True)
 def test_a_program_that_stops_stepping_leaves_no_leg_in_the_air(peer: PtyPeer) -> None:
     """As with the node: 0.5 s after the last targets the robot is laid down."""
     lifted = [q + 0.3 * (name == 'fl_thigh_joint') for name, q in POSE.items()]
@@ -268,13 +300,8 @@ def test_a_program_that_stops_stepping_leaves_no_leg_in_the_air(peer: PtyPeer) -
         backend.reset()
         for _ in range(80):
             backend.step(lifted)
-        until = time.monotonic() + 10.0
-        while time.monotonic() < until:
-            if all(abs(peer.angles[motor] - lying[motor]) < 1.5 for motor in LEG_MOTORS):
-                break
-            time.sleep(0.05)
-        else:
-            pytest.fail(f'it is not laid down: {peer.angles}')
+        legs = pytest.approx([lying[motor] for motor in LEG_MOTORS], abs=1.5)
+        wait_for(lambda: [peer.angles[motor] for motor in LEG_MOTORS] == legs, 'lying pose')
 
 
 def test_a_robot_that_is_lost_is_reported(peer: PtyPeer) -> None:
@@ -304,11 +331,8 @@ def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(
         warnings: list[str] = []
         robot.on_warning = warnings.append
         robot.start()
-        until = time.monotonic() + 15.0
-        while time.monotonic() < until and peer.angles[12] < 92.0:
-            if robot.latest is not None:
-                robot.command(beyond)
-            time.sleep(0.02)
+        wait_for(lambda: robot.latest is not None, 'robot')
+        wait_for(lambda: robot.command(beyond) and peer.angles[12] > 92.0, 'leg at its limit')
         sent = robot._estimator._sent['fl_thigh_joint']
         robot.end(warnings.append)
     assert robot.counters.clamped > 0

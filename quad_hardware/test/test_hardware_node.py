@@ -30,7 +30,6 @@ from quad_hardware.joints import LimiterSettings, MAX_PERIOD
 from quad_hardware.nodes import parameters
 from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.nodes.parameters import NodeSettings
-from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_msgs.msg import FootContacts
 from quad_node_rig import NodeRig, TIMEOUT
 
@@ -125,6 +124,7 @@ def rig(shared_rig: NodeRig) -> NodeRig:
 @on_node
 def test_the_topics_of_the_article(rig: NodeRig) -> None:
     """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos follow."""
+    problems = rig.client.listen(String, '/servo_problem', LATCHED)
     rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
     rig.stream(POSE, 1.0)
     joints = rig.receive('/joint_states', 3)
@@ -143,6 +143,7 @@ def test_the_topics_of_the_article(rig: NodeRig) -> None:
     assert list(contacts.contact) == [True] * 4
     assert contacts.source == FootContacts.MEASURED_HEIGHT
     assert rig.receive('/battery_state').percentage == pytest.approx(0.8)
+    assert [problem.data for problem in problems] == ['']
     pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.receive('/tf').transforms]
     assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
     published = rig.client.node.get_publishers_info_by_topic('/joint_states')
@@ -202,18 +203,15 @@ def test_limits_of_the_urdf_count_and_a_servo_beyond_them_is_left_there(rig: Nod
 
 
 @on_node
-def test_joints_that_were_never_checked_do_not_move(rig: NodeRig) -> None:
+def test_joints_that_were_never_checked_do_not_move(isolation: Isolation, tmp_path: Path) -> None:
     """Commands are refused, and the controller receives why the robot must not stand up."""
-    problems = rig.client.listen(String, '/servo_problem', LATCHED)
-    rig.restart('-p', 'joints_checked:=false')
-    rig.client.spin_until(
-        lambda: any('never checked' in problem.data for problem in problems), TIMEOUT, 'problem'
-    )
-    rig.command(POSE)
-    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'calibrate first-motion')
-    assert rig.peer.commands == []
-    rig.restart()
-    rig.client.spin_until(lambda: problems[-1].data == '', TIMEOUT, 'no problem')
+    with NodeRig(isolation, tmp_path, '-p', 'joints_checked:=false') as rig:
+        problems = rig.client.listen(String, '/servo_problem', LATCHED)
+        rig.client.spin_until(lambda: bool(problems), TIMEOUT, 'problem')
+        assert 'never checked' in problems[-1].data
+        rig.command(POSE)
+        rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'calibrate first-motion')
+        assert rig.peer.commands == []
 
 
 @on_node
@@ -357,22 +355,3 @@ def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) 
     rig.stream(HOME, 1.0)
     assert len(rig.peer.commands) > count
     assert rig.peer.angles[11] != pytest.approx(20.0, abs=1.0)
-
-
-@on_node
-@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
-def test_torque_comes_back_where_the_arm_is(
-    isolation: Isolation, tmp_path: Path, protocol: Protocol
-) -> None:
-    """Each reported servo gets its own position as target before it wakes; an arm would snap."""
-    torque = '/hardware_node/torque'
-    reported = set(MOTOR_ORDER if protocol is V2 else BULK_READ_ORDER)
-    with NodeRig(isolation, tmp_path, '-p', 'arm:=true', protocol=protocol) as rig:
-        assert rig.client.call(SetBool, torque, SetBool.Request(data=False)).success
-        rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
-        rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-        rig.receive_position(math.radians(20.0))
-        assert rig.client.call(SetBool, torque, SetBool.Request(data=True)).success
-        rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
-        targets = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}
-    assert targets == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
