@@ -309,6 +309,18 @@ def test_a_slow_board_makes_the_reports_fewer(
     assert least <= rig.dialect.counters.unanswered <= most
 
 
+def test_a_board_that_becomes_slow_is_waited_for() -> None:
+    """A few answers are given up, until the wait is long enough."""
+    rig = OldRig(0.001)
+    rig.run(1.0)
+    rig.latency = 0.03
+    rig.run(1.0)
+    before, unanswered = len(rig.states), rig.dialect.counters.unanswered
+    rig.run(1.0)
+    assert len(rig.states) - before >= 10
+    assert rig.dialect.counters.unanswered == unanswered
+
+
 def test_half_a_report_is_no_report() -> None:
     """An IMU answer without the angles of its period gives nothing."""
     dialect = V1Dialect(0.0)
