@@ -84,6 +84,15 @@ class Script(Console):
         return answer
 
 
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Wait for something."""
+    deadline = time.monotonic() + TIMEOUT
+    while not condition():
+        assert time.monotonic() < deadline, f'no {what}'
+        time.sleep(0.002)
+
+
+TIMEOUT = 30.0  # [s] for anything to happen, on a busy machine
 PUSH_PERIOD = 0.02  # [s]
 TURN_REPORTS = 25  # of the IMU, in which a hand turns the body, however late they are
 MAX_GAP = 0.1  # [s] between two of them, of a turn that was seen

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 import json
@@ -27,7 +27,7 @@ from quad_hardware.link import LinkOptions, LinkState
 from quad_hardware.protocol import BULK_READ_ORDER, LEG_MOTORS, MOTOR_ORDER, Protocol, V1, V2
 from quad_hardware.recording import read_serial_log
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
-from quad_pty_peer import PtyPeer
+from quad_pty_peer import PtyPeer, TIMEOUT, wait_for
 
 URDF = robot_urdf('lite')
 JOINTS = JointMap(map(servo_of, movable_joints(URDF)))
@@ -35,7 +35,6 @@ POSE = pose_positions(Pose.STAND)
 STAND = [POSE[name] for name in JOINTS.names]
 STANDING = (0.0, 0.6, -0.3) * 4
 LIFTED = (0.0, 0.9, -0.9)  # of a leg in the air
-TIMEOUT = 30.0  # [s] for a report, on a busy machine
 
 
 def settings_at(port: Path, log: Path | None = None) -> RobotSettings:
@@ -224,14 +223,6 @@ def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
         assert state.joints.positions == pytest.approx(STAND, abs=0.02)
     wanted = JOINTS.angles(STAND)
     assert {m: peer.angles[m] for m in LEG_MOTORS} == pytest.approx(wanted, abs=1.0)
-
-
-def wait_for(condition: Callable[[], bool], what: str) -> None:
-    """Wait for something."""
-    deadline = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < deadline, f'no {what}'
-        time.sleep(0.02)
 
 
 def test_torque_comes_back_where_the_arm_is(peer: PtyPeer) -> None:

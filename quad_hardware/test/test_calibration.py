@@ -12,7 +12,6 @@ import math
 from pathlib import Path
 import re
 import threading
-import time
 from typing import Any
 
 from geometry_msgs.msg import Twist
@@ -34,7 +33,7 @@ from quad_hardware.calibration.odometry import Place, way
 from quad_hardware.calibration.wizard import MIN_TURN, with_direction
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2
-from quad_pty_peer import PtyPeer, Script
+from quad_pty_peer import PtyPeer, Script, wait_for
 
 PERIOD = 0.01  # [s]
 
@@ -139,10 +138,7 @@ def test_who_breaks_off_has_it_stopped(
     assert run_calibrate(command, script) == 1
     assert script.said[-1] == 'cancelled; nothing was written'
     assert not output.exists()
-    deadline = time.monotonic() + 10.0
-    while walking_robot.velocity.linear.x != 0.0:
-        assert time.monotonic() < deadline, 'it walks on'
-        time.sleep(0.01)
+    wait_for(lambda: walking_robot.velocity.linear.x == 0.0, 'end of the walk')
 
 
 @pytest.mark.scenario

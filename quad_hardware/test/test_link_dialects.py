@@ -44,9 +44,8 @@ from quad_hardware.protocol import (
     V2,
 )
 from quad_hardware.report import Report
-from quad_pty_peer import PtyPeer, state_frame
+from quad_pty_peer import PtyPeer, state_frame, TIMEOUT
 
-TIMEOUT = 15.0  # [s]
 METHOD = 'write_servo_angle'  # of our stand-in; what the vendor calls it is not public
 
 

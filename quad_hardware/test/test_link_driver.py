@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 import termios
 import threading
-import time
 from typing import Any, TYPE_CHECKING
 
 import pytest
@@ -19,14 +18,13 @@ from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState, SerialPo
 from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, V1, V2
 from quad_hardware.report import Report
-from quad_pty_peer import PtyPeer
+from quad_pty_peer import PtyPeer, wait_for
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 pytestmark = pytest.mark.slow
 
-TIMEOUT = 15.0  # [s] for anything to happen
 LEGS = dict.fromkeys(LEG_MOTORS, 0.0)
 
 
@@ -85,14 +83,6 @@ class Rig:
     def __exit__(self, *_error: object) -> None:
         """Stop it."""
         self.driver.stop()
-
-
-def wait_for(condition: Callable[[], bool], what: str) -> None:
-    """Wait for something."""
-    deadline = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < deadline, f'no {what}'
-        time.sleep(0.002)
 
 
 @pytest.fixture(params=[V2, V1], ids=lambda protocol: protocol.name)
