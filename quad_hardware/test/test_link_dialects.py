@@ -18,15 +18,7 @@ import pytest
 from xgo_lib2 import feedback
 
 from quad_hardware import LinkError
-from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState
-from quad_hardware.link.dialects import (
-    HOST_GAP,
-    MIN_RATE,
-    REQUEST_PERIOD,
-    UnseenServo,
-    V1Dialect,
-    V2Dialect,
-)
+from quad_hardware.link import Dialect, dialects, Driver, LinkOptions, LinkState
 from quad_hardware.link.open import open_session
 from quad_hardware.protocol import (
     ANGLE_SPANS,
@@ -130,7 +122,7 @@ class OldRig:
 
     def __init__(self, latency: float = 0.002) -> None:
         self.now = 0.0
-        self.dialect: Dialect = V1Dialect(self.now)
+        self.dialect: Dialect = dialects.V1Dialect(self.now)
         self.latency = latency
         self.lose_each = 0
         self._requested = 0
@@ -207,7 +199,7 @@ def test_the_old_protocol_is_polled_and_commanded_at_50_hz() -> None:
     assert len(rig.states) >= 99
     for (t0, frame), (t1, _) in zip(rig.sent, rig.sent[1:], strict=False):
         wire = V1.wire_time(len(frame.encode(V1)))
-        assert t1 - t0 >= wire + HOST_GAP - 1e-9
+        assert t1 - t0 >= wire + dialects.HOST_GAP - 1e-9
 
 
 def test_an_arm_joint_is_sent_when_it_changes_and_again_for_a_frame_may_be_lost() -> None:
@@ -267,17 +259,17 @@ def test_an_unseen_servo_has_arrived_only_when_it_has(
     orders: list[tuple[float, float]], place: float
 ) -> None:
     """From wherever it begins, whatever its targets: what is called arrived is there."""
-    servo = UnseenServo(ANGLE_SPANS[Model.LITE][54], 0.0)
+    servo = dialects.UnseenServo(ANGLE_SPANS[Model.LITE][54], 0.0)
     now = 0.0
     for target, time in orders:
         servo.send(target, now)
         now += time
-        way = MIN_RATE * time
+        way = dialects.MIN_RATE * time
         place = min(max(target, place - way), place + way)
         if servo.arrived(now):
             assert place == pytest.approx(target, abs=1e-6)
     servo.send(0.0, now)
-    assert servo.arrived(now + 350.0 / MIN_RATE)
+    assert servo.arrived(now + 350.0 / dialects.MIN_RATE)
 
 
 @pytest.mark.parametrize(
@@ -322,7 +314,7 @@ def test_a_board_that_becomes_slow_is_waited_for() -> None:
 
 def test_half_a_report_is_no_report() -> None:
     """An IMU answer without the angles of its period gives nothing."""
-    dialect = V1Dialect(0.0)
+    dialect = dialects.V1Dialect(0.0)
     dialect.step(0.0)  # the speed of the servos
     (request,) = StreamParser(V1, HOST_KINDS).feed(dialect.step(0.01).send)
     assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.011) is None
@@ -334,7 +326,7 @@ def test_half_a_report_is_no_report() -> None:
 
 def test_a_command_withdrawn_is_not_sent() -> None:
     """In either protocol."""
-    for dialect in (V1Dialect(0.0), V2Dialect(0.0)):
+    for dialect in (dialects.V1Dialect(0.0), dialects.V2Dialect(0.0)):
         dialect.step(0.0)
         dialect.command(LEGS)
         dialect.torque(on=False)
@@ -346,19 +338,19 @@ def test_a_command_withdrawn_is_not_sent() -> None:
 
 def test_the_new_protocol_asks_until_states_come() -> None:
     """Feedback is switched on at the start, and again whenever it stops."""
-    dialect = V2Dialect(0.0)
+    dialect = dialects.V2Dialect(0.0)
     asked = [f.address for f in StreamParser(V2, HOST_KINDS).feed(dialect.step(0.0).send)]
     assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
-    assert dialect.step(REQUEST_PERIOD / 2).send == b''
-    assert dialect.handle_frame(state_frame(), REQUEST_PERIOD / 2) is not None
-    assert dialect.step(REQUEST_PERIOD).send == b''
-    assert dialect.step(REQUEST_PERIOD * 1.5).send != b''
+    assert dialect.step(dialects.REQUEST_PERIOD / 2).send == b''
+    assert dialect.handle_frame(state_frame(), dialects.REQUEST_PERIOD / 2) is not None
+    assert dialect.step(dialects.REQUEST_PERIOD).send == b''
+    assert dialect.step(dialects.REQUEST_PERIOD * 1.5).send != b''
 
 
 @given(st.dictionaries(st.sampled_from(MOTOR_ORDER), st.floats(-180, 180), min_size=1))
 def test_a_command_of_the_new_protocol_is_one_frame(angles: dict[int, float]) -> None:
     """All servos at once, to a hundredth of a degree."""
-    dialect = V2Dialect(0.0)
+    dialect = dialects.V2Dialect(0.0)
     dialect.step(0.0)
     dialect.command(angles)
     (frame,) = StreamParser(V2, HOST_KINDS).feed(dialect.step(0.001).send)
@@ -369,7 +361,7 @@ def test_a_command_of_the_new_protocol_is_one_frame(angles: dict[int, float]) ->
 
 def test_lost_states_are_counted_by_their_sequence() -> None:
     """Across the wrap; a robot that restarted lost nothing; frames cut short do not count."""
-    dialect = V2Dialect(0.0)
+    dialect = dialects.V2Dialect(0.0)
     for sequence in (65533, 65535, 0, 3):
         dialect.handle_frame(state_frame(sequence=sequence), 0.0)
     assert dialect.counters.lost == 3
