@@ -159,7 +159,7 @@ class Arm:
         self.net.wire.loses = lambda sender, frame: what == BUS_DOWN or sender == 'master'
         self.net.wire.refuses = 'the interface is down' if what == BUS_DOWN else ''
 
-    def mend(self) -> None:
+    def end_faults(self) -> None:
         """End all faults: everything is powered again, and reaches everybody."""
         self.net.devices[FAULTY].faults.end(self.net.now)
         self.net.lose()
@@ -245,7 +245,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
         assert arm.coasted < STANDING
     stopped = arm.state(WITNESS) is not DriveState.OPERATION_ENABLED
     assert stopped is (WITNESS in fault.met)
-    arm.mend()
+    arm.end_faults()
     arm.net.run_until(arm.net.all_ready)
     arm.stands(FAULTY, WITNESS)
     for name in fault.met:
@@ -267,7 +267,7 @@ def test_fault_while_homing(fault: Fault) -> None:
     arm.strike(fault.what)
     arm.net.run(2.0 * SETTLING)
     assert isinstance(running.error, (DriveError, SdoError))
-    arm.mend()
+    arm.end_faults()
     arm.net.run_until(arm.net.all_ready)
     arm.stands(FAULTY)
     assert arm.state() is not DriveState.OPERATION_ENABLED
@@ -463,7 +463,7 @@ def test_lost_pdos_in_motion(
         arm.net.run(1.5)
         assert all(SWITCHED_OFF.title in halt.result() for halt in halts)
     arm.stands(*names)
-    arm.mend()
+    arm.end_faults()
     arm.net.run(0.7)
     arm.stands(FAULTY, WITNESS)
     for name in (FAULTY, WITNESS):
@@ -635,7 +635,7 @@ def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
         arm.net.result(arm.net.network.nodes[FAULTY].sdo.read(0x1008, 0, 0.2))
     arm.stop(FAULTY, mode)
     assert arm.state() is DriveState.OPERATION_ENABLED
-    arm.mend()
+    arm.end_faults()
     arm.net.run(1.0)
     assert_accepts_targets(arm, mode)
 
