@@ -94,7 +94,7 @@ def test_the_trained_policy_falls_less_than_half_as_often_as_the_gait() -> None:
     firm, commands = RobotChoice(servo='firm'), (Velocity(0.2), Velocity(yaw=1.0))
     policy = Candidate(find_policy('trot_ppo'), robot=firm)
     pushed, walkers = Conditions(push=2.0), (Candidate(gait=LOW_AND_WIDE, robot=firm), policy)
-    trials = [Trial(who, commands, 10.0, pushed) for who in walkers]
+    trials = [Trial(who, commands, 16.0, pushed) for who in walkers]
     gait, trained, level = run_trials([*trials, Trial(policy, course_for(None), 3.0)])
     assert gait.falls > 3
     assert trained.falls <= 0.5 * gait.falls
