@@ -280,7 +280,7 @@ WAYS = Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1)
 def test_odometry_follows_gait_and_policy(
     mode: str, velocity: Velocity, slope: float, within: float, rightly: float
 ) -> None:
-    """Within a tenth of the way, by noisy joints; it tells most contacts of the feet."""
+    """Within a tenth of the way, by noisy joints; and it shows most contacts of the feet."""
     policy, random = None, Random(1)
     if mode == 'policy':
         stand = GaitGenerator(MODEL, FIRM).stand_targets
