@@ -12,7 +12,7 @@ from model_robots import ready, robot
 import numpy as np
 import pinocchio as pin
 
-from arm_model import Array, JointLimits, Pose, RobotModel, RobotState
+from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo import (
     CoreSettings,
     DisplacementRequest,
@@ -25,7 +25,6 @@ from arm_servo import (
     Outcome,
     PauseRequest,
     Phase,
-    PoseCommand,
     SetPoint,
     SpeedRequest,
     StopRequest,
@@ -33,7 +32,7 @@ from arm_servo import (
     TwistCommand,
 )
 from arm_servo.controllers.jog import Command, ServoSource
-from arm_servo.core.requests import by_joint, ImmediateRequest, MotionRequest
+from arm_servo.core.requests import by_joint
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_trajectory import GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
 
@@ -178,14 +177,6 @@ def ending(execution: Execution) -> Outcome:
 TIMEOUT = 0.1  # time for which a jog counts in [s]
 
 
-def command(
-    core: MotionCore, request: MotionRequest | ImmediateRequest, now: float = 0.0
-) -> Execution | None:
-    """Put a request into effect; return the execution of a trajectory."""
-    motion = core.command(request, now)
-    return motion if isinstance(motion, Execution) else None
-
-
 def twist(
     core: MotionCore,
     numbers: Sequence[float] | Array,
@@ -197,7 +188,7 @@ def twist(
 ) -> None:
     """Move the tool at a speed."""
     jog = TwistCommand(np.array(numbers, dtype=np.float64), link, axes)
-    command(core, JogRequest(jog, now + duration), now)
+    core.command(JogRequest(jog, now + duration), now)
 
 
 def jog(
@@ -205,48 +196,43 @@ def jog(
 ) -> None:
     """Move joints at speeds."""
     jog = JointCommand(*by_joint(core.model, speeds, 'velocities'))
-    command(core, JogRequest(jog, now + duration), now)
-
-
-def track(core: MotionCore, pose: Pose, now: float, duration: float = TIMEOUT) -> None:
-    """Go to a pose."""
-    command(core, JogRequest(PoseCommand(pose), now + duration), now)
+    core.command(JogRequest(jog, now + duration), now)
 
 
 def follow(core: MotionCore, goal: TrajectoryGoal) -> Execution:
     """Follow a trajectory."""
-    execution = command(core, goal)
-    assert execution is not None
+    execution = core.command(goal)
+    assert isinstance(execution, Execution)
     return execution
 
 
 def move_to(core: MotionCore, positions: Mapping[str, float], max_speed: float = math.inf) -> None:
     """Move joints to positions."""
-    command(core, TargetRequest(positions, max_speed))
+    core.command(TargetRequest(positions, max_speed))
 
 
 def move_by(
     core: MotionCore, displacements: Mapping[str, float], max_speed: float = math.inf
 ) -> None:
     """Move joints on by amounts."""
-    command(core, DisplacementRequest(displacements, max_speed))
+    core.command(DisplacementRequest(displacements, max_speed))
 
 
 def override(core: MotionCore, speed: float) -> None:
     """Set the speed of trajectories and targets."""
-    command(core, SpeedRequest(speed))
+    core.command(SpeedRequest(speed))
 
 
 def pause(core: MotionCore) -> None:
     """Come to rest until resumed."""
-    command(core, PauseRequest())
+    core.command(PauseRequest())
 
 
 def resume(core: MotionCore) -> None:
     """Go on."""
-    command(core, PauseRequest(is_paused=False))
+    core.command(PauseRequest(is_paused=False))
 
 
 def stop(core: MotionCore, reason: str = 'stopped') -> None:
     """Come to rest."""
-    command(core, StopRequest(reason))
+    core.command(StopRequest(reason))

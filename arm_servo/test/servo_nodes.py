@@ -4,17 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from control_msgs.msg import JointJog
 from geometry_msgs.msg import TwistStamped
+from isolation import Isolation
 from moveit_msgs.msg import PlanningScene, ServoStatus
 from moveit_msgs.srv import ServoCommandType
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
 from ros_client import RosClient
 from servo_commands import Drives, SteppedWorker
 from std_srvs.srv import SetBool
@@ -36,6 +41,21 @@ class _Server:
     def notify_execute(self, handle: Any, _: object) -> None:
         """Answer at once."""
         handle.result = self._execute(handle)
+
+
+@contextmanager
+def ros_node(isolation: Isolation, name: str) -> Iterator[Any]:
+    """Make a node whose messages the test hands over."""
+    context = Context()
+    rclpy.init(context=context, domain_id=isolation.domain_id)
+    node: Any = Node(name, context=context, enable_rosout=False)
+    try:
+        yield node
+    finally:
+        for waitable in list(node.waitables):
+            waitable.destroy()
+        node.destroy_node()
+        rclpy.shutdown(context=context)
 
 
 class GoalNode:

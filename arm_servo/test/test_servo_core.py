@@ -26,12 +26,8 @@ import numpy as np
 import pytest
 
 from arm_model import CommandError, ModelError, Pose
-from arm_servo import Cause, MotionCore, NotReadyError, Phase, SetPoint, Source
-from arm_trajectory import (
-    GoalCode,
-    GoalError,
-    OnlineTrajectoryGenerator,
-)
+from arm_servo import JogRequest, MotionCore, NotReadyError, Phase, PoseCommand, SetPoint, Source
+from arm_trajectory import GoalCode, GoalError, OnlineTrajectoryGenerator
 
 PERIOD = 0.01
 CLEAR = 0.0045  # clearance of a stop in [m], and a little for sliding along
@@ -237,18 +233,6 @@ def test_a_pause_holds_everything() -> None:
         core_commands.move_by(core, {'prbt_joint_1': 0.5})
 
 
-def test_what_limits_is_in_the_set_point() -> None:
-    """The report of a cycle names joint and factor."""
-    core = core_of('prbt')
-    core_commands.twist(core, [0.0, 0.0, 1.0, 0, 0, 0], 0.0, duration=2.0)
-    reports = [point.report for point in stream(core, 1.0)]
-    causes = {limiter.cause for report in reports for limiter in report.limiters}
-    assert causes & {Cause.JOINT_VELOCITY, Cause.SINGULARITY, Cause.JOINT_ACCELERATION}
-    limited = next(report for report in reports if report.limiters)
-    assert limited.factor < 1.0
-    assert '%' in str(limited)
-
-
 def test_nothing_is_commanded_before_the_position_is_known() -> None:
     """Without a position every command is refused."""
     core = MotionCore(robot('prbt'))
@@ -276,7 +260,7 @@ BAD: dict[str, tuple[Callable[[MotionCore], object], str]] = {
     'unknown joint': (lambda c: send.jog(c, {'elbow': 0.1}, 0.0), "'elbow'"),
     'infinite jog': (lambda c: send.jog(c, {JOINT: INF}, 0.0), 'inf'),
     'no joint': (lambda c: send.jog(c, {}, 0.0), 'no joint'),
-    'no rotation': (lambda c: send.track(c, ONES, 0.0), 'not a rotation'),
+    'no rotation': (lambda c: c.command(JogRequest(PoseCommand(ONES), 0.1)), 'not a rotation'),
     'reflected': (lambda c: send.twist(c, TWIST, 0.0, axes=-np.eye(3)), 'axes: not a rotation'),
     'nan duration': (lambda c: send.twist(c, TWIST, 0.0, duration=NAN), 'must be finite'),
     'endless': (lambda c: send.jog(c, {JOINT: 0.1}, 0.0, INF), 'must be finite'),

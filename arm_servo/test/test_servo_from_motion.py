@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_commands import Drives, Elsewhere, jog
 
 from arm_model import Array, CommandError, RobotModel, RobotState
 from arm_servo import CoreSettings, DisplacementRequest, MotionCore, Phase, Source
@@ -209,25 +208,6 @@ def test_a_trajectory_in_motion_is_refused_with_a_time_that_suffices(
         factor = float(str(error).split('give the trajectory ')[1].split(' times')[0])
         later = replace(hasty.points[0], time=0.02 * factor)
         core.plan(replace(hasty, points=[later]), core.basis)
-
-
-@pytest.mark.parametrize('where', ['drives of this process', 'drives elsewhere'])
-def test_a_jog_at_full_speed_hands_over_to_a_trajectory(where: str) -> None:
-    """As from any client of the nodes: the trajectory takes over, and gets to its end."""
-    arm: Drives | Elsewhere = Elsewhere()
-    if where == 'drives of this process':
-        arm = Drives().following()
-    limits = arm.gateway.model.limits
-    speeds = dict.fromkeys(limits.names[:1], 0.99 * limits.velocity[0])
-    jog(arm.gateway, speeds, arm.now, 1.0)
-    arm.run(40)
-    reference = arm.gateway.snapshot.reference
-    assert reference is not None
-    assert reference.moving
-    goal = TrajectoryGoal(limits.names, [GoalPoint(2.0, tuple(reference.position))])
-    command = arm.gateway.request(goal)
-    arm.run(round(3.0 / PERIOD))
-    assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL, command.ended.result(0.0)
 
 
 GANTRY = """<robot name="gantry">

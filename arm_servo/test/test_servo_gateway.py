@@ -18,13 +18,7 @@ from servo_commands import Drives, jog, move_by, PERIOD, SteppedWorker, twist
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError, RobotModel
-from arm_servo import (
-    MotionCore,
-    NotReadyError,
-    PauseRequest,
-    Source,
-    StopRequest,
-)
+from arm_servo import MotionCore, NotReadyError, PauseRequest, Source, StopRequest
 from arm_servo.core.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
 from arm_servo.core.preparation import CommandBasis, Motion
 from arm_servo.core.requests import MAX_CYCLE_AGE

@@ -16,14 +16,7 @@ import pytest
 from servo_commands import Drives, twist
 
 from arm_model import Array, RobotModel, RobotState
-from arm_servo import (
-    Cause,
-    JointCommand,
-    Limiter,
-    MotionReport,
-    PoseCommand,
-    TwistCommand,
-)
+from arm_servo import Cause, JointCommand, Limiter, MotionReport, PoseCommand, TwistCommand
 
 pytestmark = pytest.mark.slow
 
@@ -97,40 +90,34 @@ class Jogger:
 
 
 @pytest.mark.parametrize('name', ROBOTS)
-@pytest.mark.parametrize(('down', 'speed', 'hold'), [(0.0, 0.2, 0.0), (0.3, 0.3, 1.5)])
+@pytest.mark.parametrize(('down', 'speed'), [(0.0, 0.1), (0.3, 0.3)])
 def test_an_arm_comes_back_from_the_border_on_the_same_side(
-    name: str, down: float, speed: float, hold: float
+    name: str, down: float, speed: float
 ) -> None:
-    """Out to the border, pushing on or not, a rest, and all of the way back."""
+    """Out to the border, pushing on, a rest, and all of the way back.
+
+    While it is pushed on the tool stands still, and the report says that its speed is lost.
+    """
     jogger = Jogger(name, 0.01, down)
     place, straight = ELBOW[name]
     side = np.sign(ready(name)[place] - straight)
     while jogger.jog(speed) > STUCK * speed or jogger.now < 0.5:
-        if jogger.now > 12.0:
+        if jogger.now > 12.0 and down:
             break  # it slides along the border
-    for _ in range(round(hold / jogger.period)):
-        jogger.jog(speed)
+        assert jogger.now < 30.0
+    for _ in range(round(1.5 / jogger.period)):
+        pushed = jogger.jog(speed)
+    if not down:
+        assert abs(pushed) < 0.01
+        lost = [each for each in jogger.report.limiters if each.cause is Cause.SINGULARITY]
+        assert 0.0 <= max(each.factor for each in lost) < 0.15
+        assert jogger.report.factor < 0.15
     jogger.rest()
     out, deadline = jogger.way, jogger.now + 3.0 * jogger.way / speed + 5.0
     while jogger.way > 0.01 and jogger.now < deadline:
         jogger.jog(-speed)
     assert jogger.way <= 0.01, f'{out - jogger.way:.3f} of {out:.3f} m'
     assert side * (jogger.core.state.position[place] - straight) > 0.1
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-def test_what_is_reported_at_the_border_is_what_happens(name: str) -> None:
-    """Pushing on, the tool stands still, and the report says that nothing is left of its speed."""
-    jogger = Jogger(name, 0.01, 0.0)
-    while jogger.jog(0.1) > STUCK * 0.1 or jogger.now < 0.5:
-        assert jogger.now < 30.0
-    for _ in range(300):
-        speed = jogger.jog(0.1)
-    assert abs(speed) < 0.01
-    lost = [each for each in jogger.report.limiters if each.cause is Cause.SINGULARITY]
-    assert lost
-    assert max(each.factor for each in lost) < 0.15
-    assert jogger.report.factor < 0.15
 
 
 @pytest.mark.parametrize('elbow', [1.30, 1.37, 1.42])

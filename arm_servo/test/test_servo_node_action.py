@@ -23,6 +23,12 @@ from arm_servo.ros.trajectory import TrajectoryAction, TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
+def away(drives: Drives, far: float = 0.5, time: float = 5.0) -> TrajectoryGoal:
+    """Return a trajectory that moves all joints."""
+    there = [axis.setpoint + far for axis in drives.axes]
+    return TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(time, there)])
+
+
 class Bench:
     """Simulated drives, and the node of an action whose goals have trajectories for requests."""
 
@@ -46,8 +52,7 @@ class Bench:
         self, far: float = 0.5, time: float = 5.0, meanwhile: Callable[[], object] = lambda: None
     ) -> Any:
         """Send a goal that moves all joints; something happens before it is accepted."""
-        there = [axis.setpoint + far for axis in self.drives.axes]
-        goal = TrajectoryGoal(self.drives.gateway.model.joints, [GoalPoint(time, there)])
+        goal = away(self.drives, far, time)
         message = SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
         return self.node.send(message, meanwhile)
 
@@ -171,33 +176,27 @@ def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(bench: Bench) -> N
     assert bench.drives.path[-1].tolist() == before
 
 
-def trajectory(drives: Drives) -> None:
-    """Follow a trajectory."""
-    there = [axis.setpoint + 0.5 for axis in drives.axes]
-    drives.gateway.request(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)]))
-
-
-def jogging(drives: Drives) -> None:
-    """Jog a joint."""
-    jog(drives.gateway, {'panda_joint1': 0.1}, drives.now, 5.0)
-
-
-def target(drives: Drives) -> None:
-    """Move a joint to a place."""
-    drives.gateway.request(TargetRequest({'panda_joint1': 0.5}, 0.1))
+BEGIN: dict[str, Callable[[Drives], object]] = {
+    'nothing': lambda _: None,
+    'jog': lambda drives: jog(drives.gateway, {'panda_joint1': 0.1}, drives.now, 5.0),
+    'trajectory': lambda drives: drives.gateway.request(away(drives)),
+    'single target': lambda drives: drives.gateway.request(
+        TargetRequest({'panda_joint1': 0.5}, 0.1)
+    ),
+}
 
 
 @pytest.mark.parametrize(
-    ('begin', 'paused', 'resumed'),
+    ('kind', 'paused', 'resumed'),
     [
-        (lambda _: None, 'nothing is under way', 'takes commands again'),
-        (jogging, 'the jog ends', 'takes commands again'),
-        (trajectory, 'the trajectory comes to rest on its path', 'the trajectory goes on'),
-        (target, 'the single target comes to rest on its path', 'the single target goes on'),
+        ('nothing', 'nothing is under way', 'takes commands again'),
+        ('jog', 'the jog ends', 'takes commands again'),
+        ('trajectory', 'the trajectory comes to rest on its path', 'the trajectory goes on'),
+        ('single target', 'the single target comes to rest on', 'the single target goes on'),
     ],
 )
 def test_a_pause_says_what_becomes_of_what_moves_the_arm(
-    monkeypatch: pytest.MonkeyPatch, begin: Callable[[Drives], None], paused: str, resumed: str
+    monkeypatch: pytest.MonkeyPatch, kind: str, paused: str, resumed: str
 ) -> None:
     """Each answer is of what the arm does at the call; a second call changes nothing."""
     drives, services = Drives().following(), dict[str, Any]()
@@ -213,7 +212,7 @@ def test_a_pause_says_what_becomes_of_what_moves_the_arm(
         assert answer.success
         return str(answer.message)
 
-    begin(drives)
+    BEGIN[kind](drives)
     drives.run(20)
     assert paused in call('~/pause')
     assert not np.ptp(np.array(drives.path[-10:]), axis=0).any()

@@ -19,12 +19,11 @@ from model_robots import robot
 import numpy as np
 import pinocchio as pin
 import pytest
-import rclpy
-from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from servo_commands import Drives, held_panda
+from servo_nodes import ros_node
 from tf2_msgs.msg import TFMessage
 
 from arm_model import Array, CommandError, Pose, RobotModel
@@ -217,14 +216,8 @@ class Topics:
 @pytest.fixture
 def topics(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Topics]:
     """A servo_node whose messages the test hands over."""
-    context = Context()
-    rclpy.init(context=context, domain_id=isolation.domain_id)
-    node: Any = Node('servo_node', context=context, enable_rosout=False)
-    try:
+    with ros_node(isolation, 'servo_node') as node:
         yield Topics(node, monkeypatch)
-    finally:
-        node.destroy_node()
-        rclpy.shutdown(context=context)
 
 
 def test_a_stream_of_zeros_takes_no_drives_back(topics: Topics) -> None:

@@ -193,52 +193,33 @@ def test_where_the_arm_is_to_be_is_known_before_it_follows() -> None:
     assert drives.gateway.snapshot.reference is point.state
 
 
-OFFLINE, DISABLED, SINGLE = (
-    Refusal(cause)
-    for cause in (RefusalCause.OFFLINE, RefusalCause.NOT_ENABLED, RefusalCause.SINGLE_TARGET)
-)
-
-
 @pytest.mark.parametrize(
-    ('refusals', 'words'),
+    ('causes', 'words'),
     [
         (
-            [OFFLINE, OFFLINE, DISABLED],
+            [RefusalCause.OFFLINE, RefusalCause.OFFLINE, RefusalCause.SINGLE_TARGET],
             (
                 'panda_joint1, panda_joint2 are offline; look after their power and their cable;'
-                ' panda_joint3 is not enabled; call its ~/init'
+                ' panda_joint3 moves to a single target; wait until it stands, or call its'
+                ' ~/halt; then the next command takes it back'
             ),
         ),
         (
             [None, None],
             'panda_joint1, panda_joint2 were not attached yet; the next command takes them back',
         ),
-        (
-            [SINGLE],
-            (
-                'panda_joint1 moves to a single target; wait until it stands, or call its ~/halt;'
-                ' then the next command takes it back'
-            ),
-        ),
-        (
-            [SINGLE, SINGLE],
-            (
-                'panda_joint1, panda_joint2 move to a single target; wait until they stand, or'
-                ' call their ~/halt; then the next command takes them back'
-            ),
-        ),
     ],
 )
 def test_drives_with_the_same_trouble_are_named_together(
-    refusals: list[Refusal | None], words: str
+    causes: list[RefusalCause | None], words: str
 ) -> None:
     """In one sentence, with the verb of several, and the remedy; others have their own."""
     axes = [
-        axis if refusal is None else replace(axis, followable=False, refusal=refusal)
-        for axis, refusal in zip(Drives().axes, refusals, strict=False)
+        axis if cause is None else replace(axis, followable=False, refusal=Refusal(cause))
+        for axis, cause in zip(Drives().axes, causes, strict=False)
     ]
     detached = dict.fromkeys([axis.name for axis in axes], NOT_ATTACHED)
-    assert why_not(axes, detached if None in refusals else {}) == words
+    assert why_not(axes, detached if None in causes else {}) == words
 
 
 @pytest.mark.parametrize('cause', [RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED])

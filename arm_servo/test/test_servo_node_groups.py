@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
+from typing import Any
 
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
 import numpy as np
@@ -15,7 +16,6 @@ from servo_commands import Drives, jog, PERIOD
 from servo_nodes import Listener
 
 from arm_model import CommandError, RobotModel
-from arm_model import PlanningScene as PlanningSceneModel
 from arm_servo import TargetRequest
 from arm_servo.core.gateway import MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
@@ -95,7 +95,7 @@ class Robot:
         jog(arm.gateway, {side: velocity}, arm.now, 30.0)
 
     @property
-    def scene(self) -> PlanningSceneModel:
+    def scene(self) -> Any:
         """The scene that counts for the left arm."""
         return self.arms['left'].gateway.model.scene
 

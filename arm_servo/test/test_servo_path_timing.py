@@ -212,18 +212,6 @@ def test_the_factor_of_a_refusal_suffices(name: str, seed: int, time: float, cou
     assert off < EXACT
 
 
-def test_nothing_takes_longer_than_move_group_waits() -> None:
-    """Its monitor ends an execution after 1.1 times the time asked and 0.5 s: refused before."""
-    durations = []
-    for size in (0.040, 0.042, 0.044, 0.046, 0.048):
-        core, goal = free('panda'), swinging(size, 2.0)
-        if not refusal(core, goal):
-            assert core.execution is not None
-            durations.append(core.execution.path.duration)
-            assert durations[-1] <= 1.1 * goal.points[-1].time + 0.5
-    assert 0 < len(durations) < 5
-
-
 def test_a_bulge_beyond_a_limit_is_refused() -> None:
     """Points within the limits whose speeds lead beyond one between them are refused."""
     limits, core, begin = robot('panda').limits, free('panda'), ready('panda').copy()

@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-import contextlib
 from dataclasses import replace
 from itertools import pairwise
-import math
 from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
@@ -16,10 +14,8 @@ from control_msgs.msg import JointTolerance
 from isolation import Isolation
 import numpy as np
 import pytest
-import rclpy
-from rclpy.context import Context
-from rclpy.node import Node
 from servo_commands import Drives, PERIOD
+from servo_nodes import ros_node
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
@@ -29,7 +25,7 @@ from arm_servo.core.gateway import TOGETHER
 from arm_servo.core.requests import by_joint
 from arm_servo.ros.trajectory import TrajectoryController
 from arm_servo.ros.trajectory_goals import declare_trajectory, goal_of_action
-from arm_trajectory import GoalCode, GoalError, GoalRules
+from arm_trajectory import GoalRules
 
 STEP = 0.004  # how far each trajectory of a stream goes in [rad]
 MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
@@ -140,29 +136,11 @@ def select(drives: Drives) -> None:
         drives.source.released(name, selected)
 
 
-@contextlib.contextmanager
-def disabled(client: Client) -> Iterator[None]:
-    """Disable all drives, and enable them for something else."""
-    enabled, refusal = list(client.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
-    client.drives.axes = [replace(axis, followable=False, refusal=refusal) for axis in enabled]
-    client.wait(0.1)
-    yield
-    client.drives.axes = enabled
-
-
 @pytest.fixture
 def node(isolation: Isolation) -> Iterator[Any]:
     """The node of the controller."""
-    context = Context()
-    rclpy.init(context=context, domain_id=isolation.domain_id)
-    node: Any = Node('panda_arm_controller', context=context, enable_rosout=False)
-    try:
+    with ros_node(isolation, 'panda_arm_controller') as node:
         yield node
-    finally:
-        for waitable in list(node.waitables):
-            waitable.destroy()
-        node.destroy_node()
-        rclpy.shutdown(context=context)
 
 
 @pytest.fixture
@@ -182,34 +160,17 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
     assert [goal[name].position for name in names] == pytest.approx([0.01, 0.05, 0.05])
 
 
-@pytest.mark.parametrize('field', ['path_tolerance', 'goal_tolerance'])
-@pytest.mark.parametrize(
-    ('joint', 'position', 'code', 'words'),
-    [
-        ('elbow', 0.1, GoalCode.INVALID_JOINTS, ": no joint 'elbow'; joints: panda_joint1, .*"),
-        ('panda_joint1', math.nan, GoalCode.INVALID_GOAL, ' of panda_joint1 is not a number'),
-    ],
-)
-def test_a_tolerance_that_cannot_be_kept_is_refused_before_drives_are_got_back(
-    *, arm: Arm, field: str, joint: str, position: float, code: GoalCode, words: str
-) -> None:
-    """With the name of the field."""
-    halt(arm.drives)
-    arm.drives.run(3)
-    point = JointTrajectoryPoint(positions=[axis.setpoint for axis in arm.drives.axes])
-    point.time_from_start.sec = 1
-    names = arm.drives.gateway.model.joints
+def test_tolerances_of_a_goal_are_those_of_its_fields() -> None:
+    """By the names of their joints."""
     goal = FollowJointTrajectory.Goal()
-    goal.trajectory = JointTrajectory(joint_names=names, points=[point])
-    setattr(goal, field, [JointTolerance(name=joint, position=position)])
-    command = arm.drives.gateway.request(goal_of_action(goal, 0.0))
-    with pytest.raises(GoalError, match=f'^{field}{words}$') as refused:
-        command.future.result(0.0)
-    assert refused.value.code is code
-    assert arm.taken_back == 0
+    goal.path_tolerance = [JointTolerance(name='elbow', position=0.1)]
+    goal.goal_tolerance = [JointTolerance(name='wrist', position=-1.0)]
+    made = goal_of_action(goal, 0.0)
+    assert {name: each.position for name, each in made.path_tolerance.items()} == {'elbow': 0.1}
+    assert {name: each.position for name, each in made.goal_tolerance.items()} == {'wrist': -1.0}
 
 
-@pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
+@pytest.mark.parametrize('pause', [0.0, 3.0])
 @pytest.mark.parametrize('happens', [halt, fault])
 def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
     arm: Arm, happens: Callable[[Drives], None], pause: float
@@ -231,15 +192,6 @@ def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
     arm.let_go()
     arm.stream()
     assert arm.position > rest + MOVED
-
-
-def test_a_stream_moves_no_arm_that_is_enabled(arm: Arm) -> None:
-    """It began while the drives were disabled; they were enabled for something else."""
-    with disabled(arm):
-        arm.stream(5)
-    rest = arm.position
-    arm.stream()
-    assert arm.position == pytest.approx(rest, abs=1e-6)
 
 
 def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
@@ -311,7 +263,7 @@ def test_an_empty_trajectory_stops(arm: Arm) -> None:
     assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.drives.path)) < 0.02
 
 
-@pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
+@pytest.mark.parametrize('pause', [0.0, 3.0])
 @pytest.mark.parametrize('happens', [halt, select, fault])
 def test_a_stick_that_is_held_moves_nothing_after_a_stop(
     happens: Callable[[Drives], None], pause: float
@@ -337,9 +289,11 @@ def test_a_stick_that_is_held_moves_nothing_after_a_stop(
 def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
     """It was pushed while the drives were disabled; they were enabled for something else."""
     stick = Stick()
-    stick.wait(1.0)
-    with disabled(stick):
-        stick.push(0.2, 100)
+    enabled, refusal = list(stick.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    stick.drives.axes = [replace(axis, followable=False, refusal=refusal) for axis in enabled]
+    stick.wait(0.1)
+    stick.push(0.2, 100)
+    stick.drives.axes = enabled
     rest = stick.position
     stick.push(0.2, 100)
     assert stick.position == pytest.approx(rest, abs=1e-6)
@@ -348,32 +302,23 @@ def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
     assert stick.position > rest + 0.02
 
 
-def test_others_need_not_let_go() -> None:
-    """Only who held when the arm stopped."""
-    stick = Stick()
-    stick.push(0.2, 50)
-    halt(stick.drives)
-    stick.wait(1.0)
-    rest, stick.client = stick.position, 'another'
-    stick.push(0.2, 50)
-    assert stick.position > rest + 0.02
-
-
-@pytest.mark.parametrize('lets_go', ['by a zero', 'by silence'])
-@pytest.mark.parametrize('pause', [1.0, 3.0, 6.0])
+@pytest.mark.parametrize('who', ['let go by a zero', 'was silent', 'is another'])
 @pytest.mark.parametrize('happens', [halt, select, fault])
-def test_who_let_go_before_a_stop_moves_the_arm_after_it(
-    happens: Callable[[Drives], None], pause: float, lets_go: str
+def test_who_did_not_hold_when_the_arm_stopped_moves_it_after_that(
+    happens: Callable[[Drives], None], who: str
 ) -> None:
     """A new push gets the drives back. By silence clients of moveit_servo let go."""
     stick = Stick()
     stick.push(0.2, 50)
-    if lets_go == 'by a zero':
+    if who == 'let go by a zero':
         stick.push(0.0)
-    stick.wait(5.0)
+    elif who == 'is another':
+        stick.client = 'another'
+    else:
+        stick.wait(5.0)
     happens(stick.drives)
-    stick.wait(pause)
+    stick.wait(1.0)
     rest = stick.position
     stick.push(0.2, 50)
-    assert stick.refusals == []
+    assert stick.refusals == [] or who == 'is another'
     assert stick.position > rest + 0.02
