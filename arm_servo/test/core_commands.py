@@ -31,10 +31,9 @@ from arm_servo import (
     TargetRequest,
     TwistCommand,
 )
-from arm_servo.controllers.jog import Command, ServoSource
+from arm_servo.controllers.jog import Command
 from arm_servo.core.requests import by_joint
-from arm_servo.core.safety_filter import SafetyFilter
-from arm_trajectory import GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.01  # cycle of the tests in [s]: slower than in use, so that they are quick
 
@@ -45,7 +44,7 @@ class Run:
 
     states: list[RobotState]  # state after every cycle, the start first
     report: MotionReport  # the last report
-    held_up: list[Limiter]  # what the safety filter held up, by any cycle
+    limiters: tuple[Limiter, ...]  # of the last report that names one
     moved: Array  # twist from the first pose to the last, in the base
 
 
@@ -57,29 +56,22 @@ def twist_between(model: RobotModel, start: Array, end: Array) -> Array:
 
 
 def run(
-    model: RobotModel,
-    start: Array | RobotState,
+    core: MotionCore,
     command: Command | Callable[[float], Command],
     duration: float,
     period: float = PERIOD,
 ) -> Run:
-    """Carry out a command, or one that changes with time, for a time [s]."""
-    source, generator = ServoSource(model), OnlineTrajectoryGenerator(model.limits)
-    safety_filter = SafetyFilter(model, generator)
-    state = start if isinstance(start, RobotState) else RobotState.at_rest(start)
-    safety_filter.reset(state)
-    states, held_up, report = [state], [], MotionReport()
+    """Jog by a command, or by one that changes with time, for a time [s]."""
+    states, report, limiters = [core.state], MotionReport(), ()
     for step in range(round(duration / period)):
-        now = command(step * period) if callable(command) else command
-        answer = source.step(state, now, period)
-        report = answer.report
-        plan = generator.to_velocity(state, answer.velocity)
-        assert plan is not None
-        state, limiter = safety_filter.step(state, plan.at(period), period, 0.005)
-        held_up += [limiter] if limiter is not None else []
-        states.append(state)
-    moved = twist_between(model, states[0].position, state.position)
-    return Run(states, report, held_up, moved)
+        now = step * period
+        wanted = command(now) if callable(command) else command
+        core.command(JogRequest(wanted, now + TIMEOUT), now)
+        point = core.step(now, period)
+        states.append(point.state)
+        report, limiters = point.report, point.report.limiters or limiters
+    moved = twist_between(core.model, states[0].position, states[-1].position)
+    return Run(states, report, limiters, moved)
 
 
 STREAM_PERIOD = 0.004  # cycle of the streams in [s]
@@ -153,11 +145,13 @@ def follow_to_the_end(
 
 
 def core_of(
-    name: str, settings: CoreSettings | None = None, at: Sequence[float] | Array | None = None
+    arm: str | RobotModel,
+    settings: CoreSettings | None = None,
+    at: Sequence[float] | Array | None = None,
 ) -> MotionCore:
-    """Return a core of a robot at rest: in its pose to start from, or where it is put."""
-    core = MotionCore(robot(name), settings)
-    core.reset(ready(name) if at is None else at)
+    """Return a core of an arm at rest: in its pose to start from, or where it is put."""
+    core = MotionCore(robot(arm) if isinstance(arm, str) else arm, settings)
+    core.reset(ready(core.model.name) if at is None else at)
     return core
 
 

@@ -62,13 +62,6 @@ class Drives:
         self.path: list[Array] = []  # positions commanded so far, a row for each cycle
         self.attachments: list[MotionSource] = []
 
-    def place(self, positions: Sequence[float]) -> None:
-        """Move the drives to another place."""
-        self.axes = [
-            replace(axis, position=at, setpoint=at)
-            for axis, at in zip(self.axes, positions, strict=True)
-        ]
-
     def attach(self) -> None:
         """Give the source its drives."""
         self.source.get_ready()
@@ -141,6 +134,11 @@ class Elsewhere:
                 at = (self.at - self.sag).tolist()
                 self.feedback.receive(self.gateway.model.joints, at, [], self.now)
             self.cycle.step(self.now, PERIOD)
+
+    def following(self) -> Elsewhere:
+        """Run some cycles, so that its place is known."""
+        self.run(5)
+        return self
 
     def path(self) -> Array:
         """Return the positions commanded so far, a row for each."""

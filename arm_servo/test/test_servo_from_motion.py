@@ -232,8 +232,7 @@ LIMITS = {name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0}
 
 def jogged_past_the_ball(speed: float) -> MotionCore:
     """Return a gantry that jogs along y at a speed [m/s], and is beside the ball now."""
-    core = MotionCore(RobotModel(GANTRY, GROUP, LIMITS))
-    core.reset([-0.3, -0.17 - np.sign(speed) * 0.6])
+    core = core_of(RobotModel(GANTRY, GROUP, LIMITS), at=[-0.3, -0.17 - np.sign(speed) * 0.6])
     for cycle in range(400):
         core_commands.jog(core, {'y': speed}, cycle * PERIOD)
         core.step(cycle * PERIOD, PERIOD)

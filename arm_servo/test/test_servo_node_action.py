@@ -121,23 +121,20 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
     assert (good.ending, good.result.error_code) == ('succeeded', GoalCode.SUCCESSFUL)
 
 
-def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(bench: Bench) -> None:
-    """It failed while it was watched, and no cycle comes in which the arm is at rest."""
-    goal = bench.on_its_way()
-    goal.publish_feedback = stumble
-    bench.node.watch()
-    assert goal.ending == ''
-    bench.drives.now += 11.0
-    bench.node.watch()
-    assert goal.ending == 'aborted'
-    assert 'not seen at rest for 10 s and may still move' in goal.result.error_string
+@pytest.mark.parametrize(
+    ('ending', 'rests'), [('canceled', True), ('canceled', False), ('aborted', False)]
+)
+def test_a_goal_is_answered_when_rest_was_seen(bench: Bench, ending: str, rests: bool) -> None:
+    """Drives come to rest later than their set-points; where they do not, the answer says so.
 
-
-@pytest.mark.parametrize('rests', [True, False])
-def test_a_canceled_goal_is_answered_when_rest_was_seen(bench: Bench, rests: bool) -> None:
-    """Drives come to rest later than their set-points; where they do not, the answer says so."""
+    Of a goal that was canceled, and of one that failed while it was watched.
+    """
     goal, drives = bench.on_its_way(), bench.drives
-    bench.node.cancel(goal)
+    if ending == 'canceled':
+        bench.node.cancel(goal)
+    else:
+        goal.publish_feedback = stumble
+        bench.node.watch()
     drives.run(300)
     drives.axes = [replace(axis, velocity=0.1) for axis in drives.axes]
     drives.run()
@@ -148,8 +145,9 @@ def test_a_canceled_goal_is_answered_when_rest_was_seen(bench: Bench, rests: boo
     else:
         drives.now += 11.0
     bench.node.watch()
-    assert goal.ending == 'canceled'
-    assert ('not seen at rest for 10 s' in goal.result.error_string) is not rests
+    assert goal.ending == ending
+    words = 'not seen at rest for 10 s and may still move' in goal.result.error_string
+    assert words is not rests
 
 
 def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(bench: Bench) -> None:

@@ -149,19 +149,12 @@ def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
 pytestmark = pytest.mark.slow
 
 
-def following(limits: FollowingLimits | None = None) -> Elsewhere:
-    """Return an arm whose place is known."""
-    arm = Elsewhere(limits)
-    arm.run(5)
-    return arm
-
-
 def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> None:
     """Set-points stop a little ahead of the arm, smoothly, and the joint is named.
 
     Who lets go and commands again begins where the arm is; a pause is not letting go.
     """
-    arm, limits, speed = following(), FollowingLimits(), 0.5
+    arm, limits, speed = Elsewhere().following(), FollowingLimits(), 0.5
     begin = np.array(arm.at)
     arm.moves = False
     refusals = jog_elsewhere(arm, 400, speed)
@@ -188,7 +181,7 @@ def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> No
 
 def test_a_trajectory_of_an_arm_that_stands_still_ends_with_the_joint() -> None:
     """It is no success; the joint, its distance and the remedy are in the outcome."""
-    arm = following()
+    arm = Elsewhere().following()
     arm.moves = False
     command = arm.gateway.request(swing(arm, 0.4))
     arm.run(300)
@@ -199,7 +192,7 @@ def test_a_trajectory_of_an_arm_that_stands_still_ends_with_the_joint() -> None:
 @pytest.mark.parametrize('delay', [0, 5, 18])
 def test_an_arm_that_is_late_follows(delay: int) -> None:
     """A delay, however fast the arm, is no following error; neither is what it ends with."""
-    arm = following(FollowingLimits(0.01, 0.2))
+    arm = Elsewhere(FollowingLimits(0.01, 0.2)).following()
     arm.delay = delay
     assert jog_elsewhere(arm, 200, 2.0) == []
     arm.run(30)
@@ -209,10 +202,10 @@ def test_an_arm_that_is_late_follows(delay: int) -> None:
 
 def test_a_jog_is_not_stopped_for_what_is_no_following_error() -> None:
     """A limit of 0 switches it off; joint states that are lost are named as such."""
-    endless = following(FollowingLimits(0.0))
+    endless = Elsewhere(FollowingLimits(0.0)).following()
     endless.moves = False
     assert jog_elsewhere(endless, 200) == []
-    silent = following(FollowingLimits(0.01, 0.0))
+    silent = Elsewhere(FollowingLimits(0.01, 0.0)).following()
     jog_elsewhere(silent, 50, 2.0)
     silent.is_published = False
     refusals = jog_elsewhere(silent, 60, 2.0)

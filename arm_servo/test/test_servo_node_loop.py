@@ -36,8 +36,7 @@ def test_nothing_is_sent_before_something_moves() -> None:
 @pytest.mark.parametrize('aside', [0.003, 0.019, 0.2])
 def test_it_begins_where_others_have_moved_the_arm(aside: float) -> None:
     """A way that is no more than a cycle's at full speed is not made in one cycle either."""
-    arm = Elsewhere()
-    arm.run(5)
+    arm = Elsewhere().following()
     jog_elsewhere(arm, 20)
     arm.run(80)
     arm.at = arm.at + aside
@@ -49,8 +48,7 @@ def test_it_begins_where_others_have_moved_the_arm(aside: float) -> None:
 
 def test_an_arm_that_stands_a_little_off_is_not_sent_there() -> None:
     """What a drive lacks to its set-point at rest does not shift the next motion."""
-    arm = Elsewhere()
-    arm.run(5)
+    arm = Elsewhere().following()
     jog_elsewhere(arm, 20)
     arm.run(80)
     for was_seen_to_move in (True, False):
@@ -68,8 +66,7 @@ def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest(
     what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The thread reports the error, and brakes without the core before it ends."""
-    arm = Elsewhere()
-    arm.run(5)
+    arm = Elsewhere().following()
     jog_elsewhere(arm, 30)
     failed = threading.Event()
 

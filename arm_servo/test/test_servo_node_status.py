@@ -33,7 +33,6 @@ from arm_servo import (
     Source,
     VelocityBoundsSettings,
 )
-from arm_servo.core.gateway import CommandGateway
 from arm_servo.ros.canopen_backend import CanopenMotion
 from arm_servo.ros.group_motion import Offers
 from arm_servo.ros.motion_goals import Refusals, REPEAT_PERIOD, STATUS_PERIOD
@@ -145,48 +144,44 @@ def test_a_refused_node_leaves_nothing_in_the_graph(
         rclpy.shutdown()
 
 
-Send = Callable[[CommandGateway, float], object]
 LATE = ServoSettings(ik=IkSettings(brakes=VelocityBoundsSettings(pairs=0)))
 """With these a jog brakes in front of no link, so that the safety filter stops it."""
-
-
-def sideways(gateway: CommandGateway, now: float) -> object:
-    """Jog the tool along y."""
-    return twist(gateway, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], now, 60.0)
-
-
-def inwards(gateway: CommandGateway, now: float) -> object:
-    """Jog the hand of a Panda into its forearm."""
-    return jog(gateway, {'panda_joint6': -1.0}, now, 60.0)
-
-
-def outwards(gateway: CommandGateway, now: float) -> object:
-    """Jog the first joint of a Panda to its end."""
-    return jog(gateway, {'panda_joint1': 2.0}, now, 60.0)
 
 
 SLOWED, HALTED = ServoStatus.DECELERATE_FOR_COLLISION, ServoStatus.HALT_FOR_COLLISION
 
 
+SIDEWAYS = [0.0, 0.1, 0.0, 0.0, 0.0, 0.0]  # of the tool
+OUTWARDS = {'panda_joint1': 2.0}  # to its end
+INWARDS = {'panda_joint6': -1.0}  # the hand into the forearm
+
+
 @pytest.mark.parametrize(
-    ('name', 'servo', 'send', 'codes', 'words'),
+    ('name', 'servo', 'asked', 'codes', 'words'),
     [
-        ('panda', ServoSettings(), sideways, [ServoStatus.NO_WARNING], ['free']),
-        ('panda', ServoSettings(), outwards, [ServoStatus.JOINT_BOUND], ['panda_joint1']),
-        ('panda', ServoSettings(), inwards, [SLOWED, HALTED], ['panda_link5', 'panda_hand']),
-        ('panda', LATE, inwards, [HALTED], ['panda_link5', 'panda_hand']),
-        ('gp110', ServoSettings(), sideways, [ServoStatus.HALT_FOR_SINGULARITY], ['y is lost']),
+        ('panda', ServoSettings(), SIDEWAYS, [ServoStatus.NO_WARNING], ['free']),
+        ('panda', ServoSettings(), OUTWARDS, [ServoStatus.JOINT_BOUND], ['panda_joint1']),
+        ('panda', ServoSettings(), INWARDS, [SLOWED, HALTED], ['panda_link5', 'panda_hand']),
+        ('panda', LATE, INWARDS, [HALTED], ['panda_link5', 'panda_hand']),
+        ('gp110', ServoSettings(), SIDEWAYS, [ServoStatus.HALT_FOR_SINGULARITY], ['y is lost']),
     ],
 )
 def test_what_limits_a_jog_is_reported(
-    name: str, servo: ServoSettings, send: Send, codes: list[int], words: list[str]
+    name: str,
+    servo: ServoSettings,
+    asked: list[float] | dict[str, float],
+    codes: list[int],
+    words: list[str],
 ) -> None:
     """As soon as it slows down, with the joint, the links or the direction."""
     begin = STRAIGHT['gp110'].tolist() if name == 'gp110' else None
     drives = Drives(name, begin=begin, settings=CoreSettings(servo=servo)).following()
-    send(drives.gateway, drives.now)
+    if isinstance(asked, dict):
+        jog(drives.gateway, asked, drives.now, 60.0)
+    else:
+        twist(drives.gateway, asked, drives.now, 60.0)
     found: dict[int, str] = {}
-    for _ in range(60 if send is sideways else 300):
+    for _ in range(60 if asked is SIDEWAYS else 300):
         drives.run()
         code, text = status_of(drives.gateway.snapshot, '', '', '')
         found[code] = text

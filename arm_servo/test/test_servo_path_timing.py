@@ -9,7 +9,7 @@ import math
 import re
 
 import core_commands
-from core_commands import ending, goal_to, kept, STREAM_PERIOD
+from core_commands import core_of, ending, goal_to, kept, STREAM_PERIOD
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS, table, texts
@@ -37,11 +37,12 @@ WITHOUT_JERK = RobotModel(
 )
 
 
-def free(name: str, model: RobotModel | None = None) -> MotionCore:
-    """Return a core of a robot in its pose to start from, without a look at collisions."""
-    core = MotionCore(model or robot(name), CoreSettings(check_self_collision=False))
-    core.reset(ready(name))
-    return core
+FREE = CoreSettings(check_self_collision=False)
+
+
+def free(arm: str | RobotModel) -> MotionCore:
+    """Return a core of an arm in its pose to start from, without a look at collisions."""
+    return core_of(arm, FREE)
 
 
 def refusal(core: MotionCore, goal: TrajectoryGoal) -> str:
@@ -137,7 +138,7 @@ def test_an_assumed_jerk_suffices_for_the_time_parameterization_of_moveit(
     limits, begin = WITHOUT_JERK.limits, ready('panda')
     end = begin + np.random.default_rng(seed).uniform(-size, size, len(begin))
     end = np.clip(end, limits.lower + 0.01, limits.upper - 0.01)
-    core = free('panda', WITHOUT_JERK)
+    core = free(WITHOUT_JERK)
     assert not refusal(core, time_optimal(limits, begin, end, 'pva', 0.1))
 
 
@@ -152,7 +153,7 @@ def test_a_refusal_for_an_assumed_jerk_names_it_as_assumed(is_assumed: bool) -> 
         there = ready('panda') + bend * (1.0 - math.cos(rate * time)) / rate**2
         speed, gain = bend * math.sin(rate * time) / rate, bend * math.cos(rate * time)
         points.append(GoalPoint(time, tuple(there), tuple(speed), tuple(gain)))
-    reason = refusal(free('panda', model), TrajectoryGoal(model.joints, points))
+    reason = refusal(free(model), TrajectoryGoal(model.joints, points))
     assert 'its limit of jerk is' in reason
     assert ('(assumed, as the limits file has no max_jerk)' in reason) is is_assumed
 

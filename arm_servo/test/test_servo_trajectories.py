@@ -47,7 +47,7 @@ def prbt(**execution: Any) -> MotionCore:
 
 def off_the_path(states: list[RobotState], path: Path) -> float:
     """Return how far positions are from the nearest place of a path, at most, in [rad]."""
-    places = np.array([path.at(t).position for t in np.linspace(0, path.duration, 4000)])
+    places = np.array([path.at(t).position for t in np.linspace(0, path.duration, 2000)])
     return max(float(np.abs(places - s.position).max(axis=1).min()) for s in states[::10])
 
 
@@ -169,8 +169,7 @@ def test_a_trajectory_is_joined_at_any_time(age: float) -> None:
 
 def test_continuous_joints_take_the_short_way() -> None:
     """A goal a turn away is half a turn away at most; a drive that counts from -pi is there."""
-    core = MotionCore(chain('cyyzyz'))
-    core.reset([3.0, 0.0, 0.5, 0.0, 0.5, 0.0])
+    core = core_of(chain('cyyzyz'), at=[3.0, 0.0, 0.5, 0.0, 0.5, 0.0])
     tight = dict.fromkeys(core.model.joints, JointTolerance(0.01))
     goal = goal_to(core, (-3.0 - 4 * math.pi, 0.0, 0.5, 0.0, 0.5, 0.0))
     execution = core_commands.follow(
