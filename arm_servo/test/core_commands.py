@@ -62,7 +62,8 @@ def run(
     period: float = PERIOD,
 ) -> Run:
     """Jog by a command, or by one that changes with time, for a time [s]."""
-    states, report, limiters = [core.state], MotionReport(), ()
+    states, report = [core.state], MotionReport()
+    limiters: tuple[Limiter, ...] = ()
     for step in range(round(duration / period)):
         now = step * period
         wanted = command(now) if callable(command) else command

@@ -6,13 +6,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 import time
-from typing import Any
 
 from isolation import Isolation
 import pytest
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
+from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from servo_commands import Drives, PERIOD
 from urdf_reader import Mimic
@@ -51,32 +48,22 @@ def test_what_is_old_is_published_no_more() -> None:
 
 def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
     """Its own joint states come beside the arm's, stamped when the oldest was measured."""
-    rclpy.init(domain_id=isolation.domain_id)
     drives, _ = ready()
     drives.axes[2] = replace(drives.axes[2], age=0.3)
     received: list[JointState] = []
-    nodes: list[Any] = [Node('joint_state_broadcaster'), Node('gripper')]
-    node, gripper = nodes
-    try:
-        JointStateBroadcaster(
-            node, drives.gateway, ['gripper'], {'finger': Mimic('gripper', -2.0, 1.0)}, active=True
-        )
-        publisher = gripper.create_publisher(JointState, 'gripper/joint_states', 10)
-        gripper.create_subscription(JointState, 'joint_states', received.append, 10)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.add_node(gripper)
-        deadline = time.monotonic() + 30.0
-        while not any('gripper' in message.name for message in received):
+    with RosClient(isolation.domain_id, 'joint_state_broadcaster') as client:
+        mimics = {'finger': Mimic('gripper', -2.0, 1.0)}
+        JointStateBroadcaster(client.node, drives.gateway, ['gripper'], mimics, active=True)
+        publisher = client.node.create_publisher(JointState, 'gripper/joint_states', 10)
+        client.node.create_subscription(JointState, 'joint_states', received.append, 10)
+
+        def is_whole() -> bool:
             drives.now = time.monotonic() - PERIOD
             drives.run()
             publisher.publish(JointState(name=['gripper'], position=[0.04], velocity=[0.0]))
-            executor.spin_once(timeout_sec=0.05)
-            assert time.monotonic() < deadline
-    finally:
-        for each in nodes:
-            each.destroy_node()
-        rclpy.shutdown()
+            return any('gripper' in message.name for message in received)
+
+        client.spin_until(is_whole, 30.0, 'joint states of all')
     whole = next(message for message in received if 'gripper' in message.name)
     assert [*whole.name] == [*drives.source.axes, 'gripper', 'finger']
     assert [*whole.position[-2:]] == pytest.approx([0.04, 0.92])

@@ -26,6 +26,7 @@ from arm_servo.core.requests import by_joint
 from arm_servo.ros.trajectory import TrajectoryController
 from arm_servo.ros.trajectory_goals import declare_trajectory, goal_of_action
 from arm_trajectory import GoalRules
+from arm_trajectory import JointTolerance as Tolerance
 
 STEP = 0.004  # how far each trajectory of a stream goes in [rad]
 MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
@@ -166,8 +167,8 @@ def test_tolerances_of_a_goal_are_those_of_its_fields() -> None:
     goal.path_tolerance = [JointTolerance(name='elbow', position=0.1)]
     goal.goal_tolerance = [JointTolerance(name='wrist', position=-1.0)]
     made = goal_of_action(goal, 0.0)
-    assert {name: each.position for name, each in made.path_tolerance.items()} == {'elbow': 0.1}
-    assert {name: each.position for name, each in made.goal_tolerance.items()} == {'wrist': -1.0}
+    assert made.path_tolerance == {'elbow': Tolerance(0.1)}
+    assert made.goal_tolerance == {'wrist': Tolerance(-1.0)}
 
 
 @pytest.mark.parametrize('pause', [0.0, 3.0])

@@ -86,8 +86,8 @@ def test_nodes_begin_with_upstream_parameters(
     reported: list[str] = []
 
     def make_node(name: str) -> Node:
-        made.append(Node(name))
-        return made[-1]
+        made.append(node := Node(name))
+        return node
 
     try:
         build_motion(make_node, offers)
