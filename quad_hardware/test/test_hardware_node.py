@@ -34,12 +34,10 @@ from quad_msgs.msg import FootContacts
 from quad_node_rig import NodeRig, TIMEOUT
 
 WRONG = {
-    'protokoll:=old': "did you mean 'protocol'",
     'protocol:=v3': "protocol is 'v3': it must be auto, vendor, v1, developer or v2",
     'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
     'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
     'robot_description:=<robot/>': 'has no <link>',
-    'robot_description:=none': 'no XML',
     'max_joint_speed:=fast': "max_joint_speed is 'fast': it must be a number",
     'max_joint_speed:=500.0': 'max_joint_speed is 500.0: it must be 0.1 to 100.0',
     'publish_tf:=3': 'publish_tf is 3: it must be true or false',

@@ -105,8 +105,17 @@ def make(
         assert left == ['watcher'], 'a node is gone whether it was refused or destroyed'
 
 
+def source(**changes: str) -> str:
+    """Return the parameters of a source of twist_mux."""
+    values = {'topic': 'a', 'timeout': '1', 'priority': '3', **changes}
+    return ' '.join(f'topics.a.{name}:={value}' for name, value in values.items())
+
+
+STOP = source().replace('topics.a', 'locks.stop')
+
+
 @pytest.mark.parametrize(
-    ('node', 'parameter', 'message'),
+    ('node', 'parameters', 'message'),
     [
         (TeleopKeyboard, 'speeed:=0.2', "unknown parameter 'speeed'; did you mean 'speed'?"),
         (TeleopKeyboard, 'speed:=9', 'speed is 9: it must be 0.01 to 3.0'),
@@ -126,44 +135,26 @@ def make(
         (TwistMux, 'topics.keyboard.topic:=key_vel', 'topics.keyboard.timeout is missing'),
         (TwistMux, 'topcs.keyboard.topic:=key_vel', "'topcs'; did you mean 'topics'?"),
         (TwistMux, 'topics.keyboard:=key_vel', 'unknown parameter topics.keyboard'),
+        (TwistMux, source(priorty='1'), "did you mean 'topics.a.priority'?"),
+        (TwistMux, source(priority='256'), 'topics.a.priority is 256: it must be 0 to 255'),
+        (TwistMux, source(priority='1.5'), 'priority is 1.5: it must be a whole number'),
+        (TwistMux, source(priority='true'), 'priority is True'),
+        (TwistMux, source(timeout='-1.0'), 'timeout is -1'),
+        (TwistMux, source(timeout='.nan'), 'timeout is nan'),
+        (TwistMux, source(timeout='.inf'), 'timeout is inf'),
+        (TwistMux, source(timeout='soon'), "timeout is 'soon'"),
+        (TwistMux, source(topic='""'), 'topic is empty'),
+        (TwistMux, source(topic='7'), 'topic is 7'),
+        (TwistMux, f'{source()} {STOP}', 'a and stop both'),
+        (TwistMux, STOP, 'no topics'),
     ],
 )
 def test_wrong_parameter_is_refused(
-    isolation: Isolation, node: Callable[[], Node], parameter: str, message: str
+    isolation: Isolation, node: Callable[[], Node], parameters: str, message: str
 ) -> None:
     """A misspelt or senseless parameter is refused, with what it must be or what was meant."""
     with pytest.raises(ERRORS, match=re.escape(message)):
-        make(isolation, node, parameter)
-
-
-ONE = {'topics.a.topic': 'a', 'topics.a.timeout': '1', 'topics.a.priority': '3'}
-STOP = {name.replace('topics.a', 'locks.stop'): value for name, value in ONE.items()}
-
-
-@pytest.mark.parametrize(
-    ('parameters', 'message'),
-    [
-        (ONE | {'topics.a.priorty': '1'}, "did you mean 'topics.a.priority'?"),
-        (ONE | {'topics.a.priority': '256'}, 'topics.a.priority is 256: it must be 0 to 255'),
-        (ONE | {'topics.a.priority': '1.5'}, 'priority is 1.5: it must be a whole number'),
-        (ONE | {'topics.a.priority': 'true'}, 'priority is True'),
-        (ONE | {'topics.a.timeout': '-1.0'}, 'timeout is -1'),
-        (ONE | {'topics.a.timeout': '.nan'}, 'timeout is nan'),
-        (ONE | {'topics.a.timeout': '.inf'}, 'timeout is inf'),
-        (ONE | {'topics.a.timeout': 'soon'}, "timeout is 'soon'"),
-        (ONE | {'topics.a.topic': '""'}, 'topic is empty'),
-        (ONE | {'topics.a.topic': '7'}, 'topic is 7'),
-        (ONE | STOP, 'a and stop both'),
-        (STOP, 'no topics'),
-    ],
-)
-def test_wrong_sources_of_twist_mux_are_refused_by_name(
-    isolation: Isolation, parameters: dict[str, str], message: str
-) -> None:
-    """A parameter that is misspelt, missing or senseless is named, with what it must be."""
-    words = [f'{name}:={value}' for name, value in parameters.items()]
-    with pytest.raises(ERRORS, match=re.escape(message)):
-        make(isolation, TwistMux, *words)
+        make(isolation, node, *parameters.split())
 
 
 @pytest.mark.parametrize(
@@ -171,7 +162,7 @@ def test_wrong_sources_of_twist_mux_are_refused_by_name(
     [
         (TeleopKeyboard, 'speed:=0.3 turn:=1 stamped:=true twist:=false', '/cmd_vel_stamped'),
         (gamepad, 'preset:=ps enable_button:=right_trigger turbo_button:=none', '/cmd_vel'),
-        (TwistMux, 'topics.a.topic:=a topics.a.timeout:=1 topics.a.priority:=3', '/cmd_vel_out'),
+        (TwistMux, source(), '/cmd_vel_out'),
         (TwistMux, '', '/cmd_vel_out'),
     ],
 )
