@@ -46,7 +46,7 @@ from quad_controller.policy_check.course import (
 )
 from quad_controller.policy_check.findings import against_gait, is_too_late, timing_notes
 from quad_controller.policy_check.main import ExitCode, run
-from quad_controller.policy_check.trial import Candidate, run_trials, Trial
+from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
 from quad_description import robot_urdf, RobotState
 from quad_gait_rig import joined, metadata, ROBOT, write_policy
 from quad_hardware import NoAnswerError
@@ -281,6 +281,12 @@ def test_a_course_has_what_a_policy_was_trained_for() -> None:
     assert course_for(ranges)[:4] == tuple(map(Velocity, speeds))
     assert all(each.yaw >= 0.0 for each in course_for(ranges))
     assert {axis_of(each) for each in course_for(ranges)} == {'forward', 'turn'}
+
+
+def test_minutes_are_shared_among_those_who_walk() -> None:
+    """The shortest that the command takes is enough for every command."""
+    assert chain_duration(0.8, 2, 12) > 0.5
+    assert chain_duration(2.0, 2, 9) == pytest.approx((60.0 - 3.5) / 9 - 1.0)
 
 
 @pytest.mark.slow

@@ -45,7 +45,7 @@ LEVEL = math.radians(5.0)
 def goes(
     rig: PhysicsRig, velocity: Velocity, within: Velocity, mode: str = 'walk', tilt: float = LEVEL
 ) -> None:
-    """Walk for eight seconds: at true speed to within that of another velocity, and upright."""
+    """Walk for eight seconds: as commanded, within a tolerance for each axis, and upright."""
     rig.mode(mode)
     rig.run(2.0, velocity)
     travel = rig.travel(8.0, velocity)
