@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 import re
 import shutil
@@ -165,25 +164,6 @@ def test_a_second_bring_up_on_the_same_is_refused(
         assert f'process {first.pid}' in output
         assert isolation.bus in output if what == 'bus' else '--namespace' in output
         assert 'bye' in ended(first)
-
-
-@pytest.mark.slow
-def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) -> None:
-    """In a namespace of the same domain, without a choice of the bus."""
-    with contextlib.ExitStack() as stack:
-        running, buses = [], set()
-        for side in ('left', 'right'):
-            arguments = ('panda', '--simulate', '--namespace', side)
-            running.append(stack.enter_context(workspace.bringup(*arguments)))
-            seen = read_until(running[-1], 'all is ready')
-            found = re.search(r'on CAN bus (\S+) in namespace /(\w+)', seen)
-            assert found is not None
-            assert found[2] == side
-            assert f'simulated drives on {found[1]}' in seen
-            buses.add(found[1])
-        assert len(buses) == 2
-        for process in running:
-            ended(process)
 
 
 @pytest.mark.slow

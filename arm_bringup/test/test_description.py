@@ -8,7 +8,6 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from model_robots import numbers, transform
 import pytest
 
 from arm_bringup.robots import DescriptionError, expand_xacro, joint_limits
@@ -18,6 +17,12 @@ def described(name: str, **arguments: str) -> ET.Element:
     """Expand the xacro of a robot."""
     file = Path(__file__).parents[1] / 'robots' / name / f'{name}.urdf.xacro'
     return ET.fromstring(expand_xacro(file, arguments))  # noqa: S314
+
+
+def numbers(element: ET.Element | None, key: str) -> list[float]:
+    """Return three numbers of an attribute, zero where there are none."""
+    text = element.get(key, '0 0 0') if element is not None else '0 0 0'
+    return [float(word) for word in text.split()]
 
 
 def attributes(element: ET.Element | None, *keys: str) -> list[float]:
@@ -113,21 +118,6 @@ def test_the_panda_is_one_tree_with_plausible_masses() -> None:
         assert least > 0
         assert least + middle >= most
     assert 15 < total < 20  # the data sheet says about 18 kg
-
-
-@pytest.mark.slow
-def test_a_capsule_is_a_cylinder_between_two_spheres() -> None:
-    """Of each collision capsule, the ends of the cylinder are the centres of the spheres."""
-    for link in described('panda', fingers='true').iter('link'):
-        parts = link.findall('collision')
-        for cylinder, *spheres in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
-            origin = cylinder.find('origin')
-            pose = transform(numbers(origin, 'xyz'), numbers(origin, 'rpy'))
-            length, radius = attributes(cylinder.find('geometry/cylinder'), 'length', 'radius')
-            for sphere, end in zip(spheres, (-length / 2, length / 2), strict=True):
-                centre = numbers(sphere.find('origin'), 'xyz')
-                assert pose @ [0, 0, end, 1] == pytest.approx([*centre, 1], abs=1e-9)
-                assert attributes(sphere.find('geometry/sphere'), 'radius') == [radius]
 
 
 def one_joint(kind: str, limit: str = '') -> str:

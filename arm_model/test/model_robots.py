@@ -8,34 +8,9 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
-
-import numpy as np
-from numpy.typing import NDArray
 
 from arm_bringup.robots import expand_xacro
 from arm_model import Array, frozen, load_limits, RobotModel
-
-Matrix = NDArray[np.float64]
-
-
-def numbers(element: ET.Element | None, key: str) -> list[float]:
-    """Read three numbers of an attribute, zero when there are none."""
-    text = element.get(key, '0 0 0') if element is not None else '0 0 0'
-    return [float(word) for word in text.split()]
-
-
-def transform(xyz: list[float], rpy: list[float]) -> Matrix:
-    """Return the homogeneous matrix of a URDF origin (fixed axes, x then y then z)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    matrix = np.eye(4)
-    matrix[:3, 3] = xyz
-    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    matrix[:3, :3] = yaw @ pitch @ roll
-    return matrix
-
 
 FOLDER = Path(__file__).parents[2] / 'arm_bringup' / 'robots'
 

@@ -191,15 +191,6 @@ def test_named_poses_are_free(name: str) -> None:
         assert np.degrees(getattr(model.limits, field)) == pytest.approx(degrees, abs=0.01)
 
 
-def test_continuous_joints_have_no_end() -> None:
-    """A continuous joint's position is a plain angle, of any number of turns."""
-    model = chain('cyyzyz')
-    assert model.limits.continuous.tolist() == [True, False, False, False, False, False]
-    turned = np.array([4 * math.pi, 0.1, 0.2, 0.3, 0.4, 0.5])
-    back = turned - np.array([4 * math.pi, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert model.pose(turned).position == pytest.approx(model.pose(back).position, abs=1e-9)
-
-
 def test_a_wheel_beside_the_arm_needs_no_limits() -> None:
     """Public descriptions write velocity 0 for continuous joints, or no <limit> at all."""
     urdf, srdf, limits = chain_texts('zyy')

@@ -83,7 +83,6 @@ ROUNDING = 1e-6  # how far it may be above that in [m]
 PADDING = 0.02  # of a link in [m]
 
 lengths = st.floats(0.02, 0.5)
-corners = st.lists(st.tuples(lengths, lengths, lengths), min_size=8, max_size=20)
 solids = st.one_of(
     st.builds(am.Box, lengths, lengths, lengths),
     st.builds(am.Sphere, lengths),

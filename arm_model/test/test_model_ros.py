@@ -158,27 +158,18 @@ def changed(
     return apply_planning_scene(scene, scene_change(message), positions, frame_of)
 
 
-@pytest.mark.parametrize(
-    ('kind', 'dimensions', 'shape'),
-    [
+def test_shapes_of_messages() -> None:
+    """The height of a cylinder comes first; prism and mesh are hulls, a plane is solid below."""
+    for kind, dimensions, shape in (
         (SolidPrimitive.BOX, [0.1, 0.2, 0.3], am.Box(0.1, 0.2, 0.3)),
         (SolidPrimitive.SPHERE, [0.1], am.Sphere(0.1)),
         (SolidPrimitive.CYLINDER, [0.4, 0.1], am.Cylinder(0.1, 0.4)),
         (SolidPrimitive.CONE, [0.4, 0.1], am.Cone(0.1, 0.4)),
-    ],
-)
-def test_primitives_have_their_lengths(
-    kind: int, dimensions: list[float], shape: am.Shape
-) -> None:
-    """The height of a cylinder comes first in the message."""
-    primitive = SolidPrimitive(type=kind, dimensions=dimensions)
-    scene = changed(MODEL.scene, thing(primitive=primitive), AT)
-    assert [each.shape for each in scene.objects['box'].shapes] == [shape]
-    assert scene.objects['box'].pose.position.tolist() == [0.5, 0.0, 0.2]
-
-
-def test_prisms_meshes_and_planes() -> None:
-    """A prism and a mesh are their hulls, a plane is solid below."""
+    ):
+        primitive = SolidPrimitive(type=kind, dimensions=dimensions)
+        found = changed(MODEL.scene, thing(primitive=primitive), AT).objects['box']
+        assert [each.shape for each in found.shapes] == [shape]
+        assert found.pose.position.tolist() == [0.5, 0.0, 0.2]
     prism = SolidPrimitive(type=SolidPrimitive.PRISM, dimensions=[0.5])
     prism.polygon.points = [Point32(x=x, y=y) for x, y in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
     message = thing(primitive=prism)

@@ -14,16 +14,8 @@ from typing import Any, TYPE_CHECKING
 from ament_index_python.packages import get_package_share_directory
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from geometry_msgs.msg import Pose as PoseMessage
-from moveit_msgs import msg
+from moveit_msgs import msg, srv
 from moveit_msgs.action import MoveGroup
-from moveit_msgs.srv import (
-    ApplyPlanningScene,
-    GetCartesianPath,
-    GetMotionPlan,
-    GetPlanningScene,
-    GetPositionFK,
-    GetPositionIK,
-)
 from processes import executable, RunningProcess
 from rclpy.action.server import ActionServer, CancelResponse
 from ros_client import RosClient
@@ -196,8 +188,10 @@ class MoveGroupRig:
 
     def apply(self, scene: msg.PlanningScene | None = None, **parts: Any) -> bool:
         """Apply a scene, or a change of its parts; return whether it was accepted."""
-        asked = ApplyPlanningScene.Request(scene=change(**parts) if scene is None else scene)
-        return bool(self.client.call(ApplyPlanningScene, '/apply_planning_scene', asked).success)
+        asked = srv.ApplyPlanningScene.Request(scene=change(**parts) if scene is None else scene)
+        return bool(
+            self.client.call(srv.ApplyPlanningScene, '/apply_planning_scene', asked).success
+        )
 
     def add(self, *things: msg.CollisionObject) -> None:
         """Add objects to the world, or change what they name."""
@@ -205,9 +199,9 @@ class MoveGroupRig:
 
     def scene(self, components: int = 0) -> msg.PlanningScene:
         """Return the scene, whole or the parts of moveit_msgs/PlanningSceneComponents."""
-        asked = GetPlanningScene.Request()
+        asked = srv.GetPlanningScene.Request()
         asked.components.components = components
-        return self.client.call(GetPlanningScene, '/get_planning_scene', asked).scene
+        return self.client.call(srv.GetPlanningScene, '/get_planning_scene', asked).scene
 
     def objects(self) -> list[str]:
         """Return the names of the objects of the world."""
@@ -221,31 +215,31 @@ class MoveGroupRig:
 
     def fk(self, frame: str = HAND, state: Any = None) -> PoseMessage:
         """Return where a link or body is in the root link, by compute_fk."""
-        asked = GetPositionFK.Request(fk_link_names=[frame])
+        asked = srv.GetPositionFK.Request(fk_link_names=[frame])
         if state is not None:
             asked.robot_state = state
-        return self.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+        return self.client.call(srv.GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
 
     def ik(self, pose: PoseMessage, frame: str = '', **fields: Any) -> Any:
         """Return the response of compute_ik for a pose of the Panda's hand."""
-        asked = GetPositionIK.Request()
+        asked = srv.GetPositionIK.Request()
         asked.ik_request = msg.PositionIKRequest(**{'group_name': 'panda_arm'} | fields)
         asked.ik_request.pose_stamped.pose = pose
         asked.ik_request.pose_stamped.header.frame_id = frame
-        return self.client.call(GetPositionIK, '/compute_ik', asked)
+        return self.client.call(srv.GetPositionIK, '/compute_ik', asked)
 
     def cartesian_path(self, *waypoints: PoseMessage, **fields: Any) -> Any:
         """Return the response of compute_cartesian_path for poses of the Panda's hand."""
         given = {'group_name': 'panda_arm', 'link_name': HAND, 'max_step': 0.01} | fields
-        asked = GetCartesianPath.Request(waypoints=list(waypoints), **given)
+        asked = srv.GetCartesianPath.Request(waypoints=list(waypoints), **given)
         asked.start_state.is_diff = True
-        return self.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+        return self.client.call(srv.GetCartesianPath, '/compute_cartesian_path', asked)
 
     def plan(self, request: msg.MotionPlanRequest) -> Any:
         """Return the moveit_msgs/MotionPlanResponse of plan_kinematic_path."""
         self._refresh()
-        asked = GetMotionPlan.Request(motion_plan_request=request)
-        answer = self.client.call(GetMotionPlan, '/plan_kinematic_path', asked, TIMEOUT)
+        asked = srv.GetMotionPlan.Request(motion_plan_request=request)
+        answer = self.client.call(srv.GetMotionPlan, '/plan_kinematic_path', asked, TIMEOUT)
         return answer.motion_plan_response
 
     def run(self, kind: Any, name: str, goal: Any) -> tuple[int, Any]:

@@ -31,7 +31,6 @@ from move_group_rig import (
 from moveit_msgs import msg
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.srv import (
-    GetMotionPlan,
     GetMotionSequence,
     QueryPlannerInterfaces,
 )
@@ -270,17 +269,11 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
 def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     """As pymoveit2: services for plan and kinematics, the action to execute, objects by topic."""
     # the start is the whole joint state as it was received; factors of 0 are its default
-    request = GetMotionPlan.Request()
-    wanted = request.motion_plan_request
-    wanted.group_name, wanted.num_planning_attempts = 'panda_arm', 5
-    wanted.allowed_planning_time = 5.0
-    wanted.workspace_parameters.header.frame_id = BASE
-    wanted.start_state.joint_state.name = JOINTS
-    wanted.start_state.joint_state.position = READY
-    wanted.start_state.joint_state.velocity = [0.0] * 7
-    wanted.goal_constraints = [joint_goal(MOVED)]
-    response = rig.client.call(GetMotionPlan, '/plan_kinematic_path', request)
-    plan = response.motion_plan_response
+    request = motion_request(joint_goal(MOVED), num_planning_attempts=5)
+    request.workspace_parameters.header.frame_id = BASE
+    here = JointState(name=JOINTS, position=READY, velocity=[0.0] * 7)
+    request.start_state = msg.RobotState(joint_state=here)
+    plan = rig.plan(request)
     assert plan.error_code.val == SUCCESS, plan.error_code
     assert plan.group_name == 'panda_arm'
     goal = ExecuteTrajectory.Goal()

@@ -135,16 +135,6 @@ def test_a_solution_has_the_pose(rig: MoveGroupRig) -> None:
     assert found.position == pytest.approx(TIP.position - 0.05 * TIP.rotation[:, 2], abs=1e-6)
 
 
-def test_collisions_are_avoided_where_that_is_asked(rig: MoveGroupRig) -> None:
-    """A box about the goal: no solution, with the name of the box."""
-    at = moved(0.1, 0.0, 0.0)
-    rig.add(box('crate', *at.position.tolist(), edge=0.1))
-    solved(rig.ik(pose_message(at), BASE))
-    refused = rig.ik(pose_message(at), BASE, avoid_collisions=True).error_code
-    assert refused.val == PlanningCode.NO_IK_SOLUTION
-    assert 'crate' in refused.message
-
-
 def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -> msg.Constraints:
     """Return a constraint of a joint."""
     limits = msg.JointConstraint(joint_name=f'panda_joint{number}', position=position)
@@ -159,23 +149,24 @@ def region(y: float) -> msg.Constraints:
     return msg.Constraints(position_constraints=[place])
 
 
-@pytest.mark.parametrize(
-    ('heeded', 'violated', 'words'),
-    [
+def test_solutions_heed_constraints_and_avoid_collisions(rig: MoveGroupRig) -> None:
+    """Of joints and places, and where it is asked a box about the goal, by its name."""
+    at = pose_message(TIP)
+    crate = box('crate', *TIP.position.tolist(), edge=0.1)
+    for heeded, violated, words in (
         # the place of the wrist alone says where the elbow is
         (joint_constraint(0.0), joint_constraint(-1.0, number=4), 'panda_joint4 is at'),
         (region(0.0), region(0.3), 'outside of its region'),
-    ],
-    ids=['joint', 'place'],
-)
-def test_solutions_heed_constraints(
-    rig: MoveGroupRig, heeded: msg.Constraints, violated: msg.Constraints, words: str
-) -> None:
-    """Of joints and places."""
-    solved(rig.ik(pose_message(TIP), BASE, constraints=heeded))
-    refused = rig.ik(pose_message(TIP), BASE, constraints=violated).error_code
+    ):
+        solved(rig.ik(at, BASE, constraints=heeded))
+        refused = rig.ik(at, BASE, constraints=violated).error_code
+        assert refused.val == PlanningCode.NO_IK_SOLUTION
+        assert words in refused.message
+    rig.add(crate)
+    solved(rig.ik(at, BASE))
+    refused = rig.ik(at, BASE, avoid_collisions=True).error_code
     assert refused.val == PlanningCode.NO_IK_SOLUTION
-    assert words in refused.message
+    assert 'crate' in refused.message
 
 
 def places_of(response: Any) -> tuple[Array, Array]:

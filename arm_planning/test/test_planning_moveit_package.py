@@ -14,13 +14,9 @@ from action_msgs.msg import GoalStatus
 from control_msgs.msg import JointTrajectoryControllerState
 from isolation import Isolation, reserve
 import move_group_rig as mg
+from moveit_msgs import srv
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.msg import MoveItErrorCodes
-from moveit_msgs.srv import (
-    GetMotionPlan,
-    GetPlannerParams,
-    QueryPlannerInterfaces,
-)
 from planning_messages import box, pose_at
 from processes import executable, RunningProcess
 import pytest
@@ -156,13 +152,13 @@ def test_planners_of_the_package_plan(panda: mg.MoveGroupRig) -> None:
     assert code.val != MoveItErrorCodes.SUCCESS
     assert re.search("'Dijkstra'; choose one of RRT.*, TRRTkConfigDefault, PTP", code.message)
     # RViz takes the names of a group out of the brackets
-    asked: Any = QueryPlannerInterfaces.Request()
-    listed = panda.client.call(QueryPlannerInterfaces, '/query_planner_interface', asked)
+    asked: Any = srv.QueryPlannerInterfaces.Request()
+    listed = panda.client.call(srv.QueryPlannerInterfaces, '/query_planner_interface', asked)
     names = listed.planner_interfaces[0].planner_ids
     assert names[:2] == ['panda_arm', 'panda_arm[RRTConnectkConfigDefault]']
     assert 'panda_arm[RRTstarkConfigDefault]' in names
-    asked = GetPlannerParams.Request(planner_config='RRTstarkConfigDefault', group='panda_arm')
-    params = panda.client.call(GetPlannerParams, '/get_planner_params', asked).params
+    asked = srv.GetPlannerParams.Request(planner_config='RRTstarkConfigDefault', group='panda_arm')
+    params = panda.client.call(srv.GetPlannerParams, '/get_planner_params', asked).params
     assert dict(zip(params.keys, params.values, strict=True)) == {
         'type': 'geometric::RRTstar', 'range': '0.0', 'goal_bias': '0.05',
         'delay_collision_checking': '1',
@@ -318,8 +314,8 @@ def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: mg.MoveG
     handle = panda.send(MoveGroup, '/move_action', mg.action_goal(request, plan_only=True))
     result = handle.get_result_async()
     hand = mg.motion_request(mg.joint_goal([0.02], ['panda_finger_joint1']), 'hand')
-    asked = GetMotionPlan.Request(motion_plan_request=hand)
-    plan = panda.client.call_async(GetMotionPlan, '/plan_kinematic_path', asked)
+    asked = srv.GetMotionPlan.Request(motion_plan_request=hand)
+    plan = panda.client.call_async(srv.GetMotionPlan, '/plan_kinematic_path', asked)
     panda.client.spin_until(plan.done, 20.0, 'plan of the hand')
     assert plan.result().motion_plan_response.error_code.val == MoveItErrorCodes.SUCCESS
     assert not result.done(), result.result().result.error_code

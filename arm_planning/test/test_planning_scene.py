@@ -12,6 +12,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Point32, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from hypothesis import given, settings
@@ -153,6 +154,9 @@ class TickingNode(QuietNode):
         self.warnings: list[str] = []
         self.receive: dict[str, Callable[[Any], None]] = {}
         self.tick: Callable[[], None] = lambda: None
+        self.get_clock = lambda: SimpleNamespace(now=lambda: SimpleNamespace(to_msg=Time))
+        self.get_logger = lambda: SimpleNamespace(warning=self.warnings.append)
+        self.create_timer = lambda _, callback: setattr(self, 'tick', callback)
 
     def create_publisher(self, _kind: Any, topic: str, _qos: Any) -> Any:
         """Keep what is published for viewers."""
@@ -160,23 +164,10 @@ class TickingNode(QuietNode):
         return SimpleNamespace(publish=self.published.append if is_shown else lambda _: None)
 
     def create_subscription(
-        self, _kind: Any, topic: str, callback: Any, _depth: Any, **_: Any
+        self, _kind: Any, topic: str, callback: Any, *_: Any, **__: Any
     ) -> None:
         """Keep who listens."""
         self.receive[topic] = callback
-
-    def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
-        """Keep the timer."""
-        self.tick = callback
-
-    def get_clock(self) -> Any:
-        """Return a clock that stands."""
-        stamp = msg.PlanningScene().robot_state.joint_state.header.stamp
-        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: stamp))
-
-    def get_logger(self) -> Any:
-        """Return a logger whose warnings are kept."""
-        return SimpleNamespace(warning=self.warnings.append)
 
     def at(self, position: float) -> None:
         """Have the first joint somewhere a moment later, and look."""
