@@ -46,9 +46,7 @@ def counter() -> Iterator[tuple[RunningProcess, Mapping[str, str]]]:
 
 @pytest.fixture
 def run(
-    counter: tuple[RunningProcess, Mapping[str, str]],
-    ros2: Ros2,
-    monkeypatch: pytest.MonkeyPatch,
+    counter: tuple[RunningProcess, Mapping[str, str]], ros2: Ros2, monkeypatch: pytest.MonkeyPatch
 ) -> Ros2:
     """Run a command line in this process, in the domain of the server."""
     monkeypatch.setenv('ROS_DOMAIN_ID', counter[1]['ROS_DOMAIN_ID'])
@@ -97,9 +95,7 @@ def test_goals_that_do_not_succeed(run: Ros2) -> None:
     )
 
 
-def test_an_interrupt_cancels_the_goal(
-    counter: tuple[RunningProcess, Mapping[str, str]],
-) -> None:
+def test_an_interrupt_cancels_the_goal(counter: tuple[RunningProcess, Mapping[str, str]]) -> None:
     """Ctrl-C does not leave a robot moving."""
     server, env = counter
     words = [*PROGRAM, 'action', 'send_goal', '-f', '/count', TYPE, '{method: 100}']
@@ -129,9 +125,7 @@ def test_goals_that_cannot_be(run: Ros2, words: tuple[str, ...], problem: str) -
     assert problem in outcome.err
 
 
-def test_a_server_that_is_not_there_yet(
-    counter: tuple[RunningProcess, Mapping[str, str]],
-) -> None:
+def test_a_server_that_is_not_there_yet(counter: tuple[RunningProcess, Mapping[str, str]]) -> None:
     """It waits, says what is near, and Ctrl-C ends it."""
     words = [*PROGRAM, 'action', 'send_goal', '/cont', TYPE]
     with RunningProcess(words, counter[1]) as process:

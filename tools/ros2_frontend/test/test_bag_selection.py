@@ -14,7 +14,7 @@ import pytest
 from ros2_frontend.bag import topic_filter
 from ros2_frontend.ros.bag_qos import for_playing, for_recording, is_compatible
 from ros2_frontend.ros.recorder import _Subscribed
-from ros2_frontend.verbs.bag_info import info_text, size_text
+from ros2_frontend.verbs.bag_info import info_text
 from rosbag_files import BagFile, BagMetadata, OfferedQos, Topic, TopicCount
 
 TYPE = 'std_msgs/msg/String'
@@ -78,14 +78,6 @@ def test_info_has_the_form_of_rosbag2() -> None:
         r'Service information: ',
         text,
     ), text
-
-
-@pytest.mark.parametrize(
-    ('size', 'text'), [(0, '0 B'), (1023, '1023 B'), (1536, '1.5 KiB'), (2**50, '1024.0 TiB')]
-)
-def test_sizes(size: int, text: str) -> None:
-    """In the unit that suits them."""
-    assert size_text(size) == text
 
 
 RELIABLE, LATCHED = OfferedQos(), OfferedQos(durability='transient_local')

@@ -147,15 +147,6 @@ def test_interrupts_are_quiet(zoo_env: Mapping[str, str], number: signal.Signals
 
 
 @pytest.mark.scenario
-def test_an_interrupt_during_discovery_is_quiet(zoo_env: Mapping[str, str]) -> None:
-    """Also while waiting for a topic that never comes."""
-    with RunningProcess([*PROGRAM, 'topic', 'hz', '/never'], zoo_env) as process:
-        process.wait_for('WARNING: topic .* does not appear to be published yet')
-        assert process.stop() == 2
-        assert 'Traceback' not in process.output
-
-
-@pytest.mark.scenario
 def test_an_interrupt_while_a_module_is_imported_is_quiet(
     zoo_env: Mapping[str, str], tmp_path: Path
 ) -> None:

@@ -64,15 +64,11 @@ def test_arrays_of_bools_and_bytes_come_back(bools: list[bool], octets: list[int
 
 
 def test_fixed_arrays_and_arrays_of_messages() -> None:
-    """36 numbers; two points given as mappings, one of them in part."""
+    """36 numbers; two points given as mappings, one of them in part; filling twice adds up."""
     numbers = [float(index) for index in range(36)]
     assert list(filled(PoseWithCovariance(), {'covariance': numbers}).covariance) == numbers
     polygon = filled(Polygon(), {'points': [{'x': 1}, {'x': 2, 'z': 3}]})
     assert [(p.x, p.y, p.z) for p in polygon.points] == [(1.0, 0.0, 0.0), (2.0, 0.0, 3.0)]
-
-
-def test_fields_that_are_not_named_keep_their_value() -> None:
-    """Filling twice adds up."""
     message = filled(Twist(), {'linear': {'x': 1}})
     assert filled(message, {'angular': {'z': 2}}).linear.x == 1.0
 
@@ -129,6 +125,7 @@ def test_values_that_fit(message: Message, text: str, value: object) -> None:
             'points: [{x: 1}, {x: a}]',
             r"points\[1\]: The 'x' field must be of type 'flo",
         ),
+        (Trigger.Request(), 'data: 1', 'Trigger_Request has no fields'),
         (PoseWithCovariance(), 'covariance: [1.0]', r"'covariance' field must be .* length 36"),
         (SolidPrimitive(), 'dimensions: [1, 2, 3, 4]', r"'dimensions' field must be .*<= 3"),
     ],
@@ -147,12 +144,6 @@ def test_an_unknown_field_is_answered_with_those_that_exist() -> None:
     assert first == "'JointState' object has no attribute 'postion'"
     assert second.startswith('JointState has the fields: header (std_msgs/Header), name (seq')
     assert third == "Did you mean 'position'?"
-
-
-def test_a_request_without_fields_says_so() -> None:
-    """There is nothing to suggest."""
-    with pytest.raises(FieldValueError, match='Trigger_Request has no fields'):
-        filled(Trigger.Request(), {'data': 1})
 
 
 def test_stamps_can_be_left_to_the_moment_of_sending() -> None:
@@ -176,18 +167,13 @@ def test_stamps_can_be_left_to_the_moment_of_sending() -> None:
         ('data:1', 'needs to be a dictionary in YAML format .YAML wants a space'),
         ('[1]', 'needs to be a dictionary'),
         ('{a: ', 'is not valid YAML'),
+        ('!!python/object/apply:os.getcwd []', 'not valid YAML'),
     ],
 )
 def test_text_that_is_no_mapping(text: str, problem: str) -> None:
-    """The usual slips are named."""
+    """The usual slips are named; no Python objects come out of a command line."""
     with pytest.raises(FieldValueError, match=problem):
         parse_mapping(text)
-
-
-def test_yaml_is_read_safely() -> None:
-    """No Python objects come out of a command line."""
-    with pytest.raises(FieldValueError, match='not valid YAML'):
-        parse_mapping('!!python/object/apply:os.getcwd []')
 
 
 PART = st.from_regex(r'[a-z][a-z0-9_]{0,4}', fullmatch=True)
@@ -271,12 +257,8 @@ def test_a_file_of_another_kind_is_refused(node: str, text: str) -> None:
     ],
 )
 def test_what_a_typed_value_means(text: str, value: object) -> None:
-    """YAML decides the type; what is no parameter value stays a text."""
+    """YAML decides the type; what is no parameter value stays a text, mixed types are refused."""
     assert parse_value(text) == value
-
-
-def test_mixed_numbers_are_floats_and_mixed_types_are_refused() -> None:
-    """[1, 2.5] is an array of doubles; [1, x] is nothing."""
     assert parameter_value_to_python(parameter('p', [1, 2.5]).value) == [1.0, 2.5]
     with pytest.raises(FrontendError, match=r"p: no parameter can be \[1, 'x'\]"):
         parameter('p', [1, 'x'])

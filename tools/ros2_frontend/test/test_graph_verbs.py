@@ -11,6 +11,7 @@ import pytest
 
 pytestmark = [pytest.mark.scenario, pytest.mark.usefixtures('zoo')]
 
+STRING, TRIGGER = 'std_msgs/msg/String', 'std_srvs/srv/Trigger'
 STRING_HASH = 'RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18'
 TOPICS = {
     '/chatter': 'std_msgs/msg/String',
@@ -63,21 +64,55 @@ QoS profile:
 """
 
 
-def test_node_list_names_the_visible_nodes(ros2: Ros2) -> None:
-    """Full names, sorted, without the hidden node and without our own."""
-    outcome = ros2('node', 'list')
-    assert (outcome.code, outcome.lines) == (0, ['/factory/worker', '/machine', '/talker'])
+@pytest.mark.parametrize(
+    ('words', 'answer'),
+    [
+        ('node list', '/factory/worker\n/machine\n/talker\n'),  # not the hidden one, nor our own
+        ('node list -a -c', '5\n'),
+        ('node info /factory/worker', INFO_OF_WORKER),  # an empty block is one empty line
+        ('topic list -t', ''.join(f'{name} [{type_}]\n' for name, type_ in TOPICS.items())),
+        ('topic --include-hidden-topics list', '\n'.join(['/_hidden_chatter', *TOPICS, ''])),
+        ('topic list --include-hidden-topics -c', f'{len(TOPICS) + 1}\n'),
+        ('topic info /chatter', f'Type: {STRING}\nPublisher count: 1\nSubscription count: 0\n'),
+        ('topic type /joint_states', 'sensor_msgs/msg/JointState\n'),
+        ('topic --include-hidden-topics type /_hidden_chatter', f'{STRING}\n'),
+        ('topic find sensor_msgs/msg/JointState', '/joint_states\n/listener/stamped\n'),
+        ('topic find rcl_interfaces/msg/NotAType', ''),
+        ('service type /set_bool', 'std_srvs/srv/SetBool\n'),
+        ('service find std_srvs/srv/Trigger', '/last_received\n/trigger\n'),
+        ('service info /trigger', f'Type: {TRIGGER}\nClients count: 0\nServices count: 1\n'),
+        ('action list', ''),
+        (
+            'action info /nothing --spin-time 0.2',
+            'Action: /nothing\nAction clients: 0\nAction servers: 0\n',
+        ),
+    ],
+)
+def test_what_is_there_is_answered_as_by_ros2cli(ros2: Ros2, words: str, answer: str) -> None:
+    """To the letter, sorted; hidden names only on request, before or behind the verb."""
+    outcome = ros2(*words.split())
+    assert (outcome.code, outcome.out, outcome.err) == (0, answer, '')
 
 
-def test_node_list_all_and_count(ros2: Ros2) -> None:
-    """`-a` adds hidden nodes, ours included; `-c` prints only how many."""
-    assert ros2('node', 'list', '-a', '-c').out == '5\n'
-
-
-def test_node_info_is_ros2clis_to_the_letter(ros2: Ros2) -> None:
-    """Six blocks; an empty one is one empty line."""
-    outcome = ros2('node', 'info', '/factory/worker')
-    assert (outcome.code, outcome.out, outcome.err) == (0, INFO_OF_WORKER, '')
+@pytest.mark.parametrize(
+    ('words', 'problem'),
+    [
+        ('node info /taker', "Unable to find node '/taker'\nDid you mean '/talker'?\n"),
+        ('topic info /chater', "Unknown topic '/chater'\nDid you mean '/chatter'"),
+        ('topic type /joint_state', "'/joint_states'"),
+        ('topic type /_hidden_chatter --spin-time 0.2', ''),
+        ('service type /set_boll', "'/set_bool'"),
+        ('service info /triger', "Unknown service '/triger'\nDid you mean '/trigger'?\n"),
+        ('action type /nothing --spin-time 0.2', ''),
+    ],
+)
+def test_what_is_not_there_is_answered_with_the_nearest(
+    ros2: Ros2, words: str, problem: str
+) -> None:
+    """Exit code 1 with nothing on stdout; the sentence of ros2cli and the hint are on stderr."""
+    outcome = ros2(*words.split())
+    assert (outcome.code, outcome.out) == (1, '')
+    assert problem in outcome.err
 
 
 def test_node_info_shows_hidden_names_on_request(ros2: Ros2) -> None:
@@ -85,27 +120,6 @@ def test_node_info_shows_hidden_names_on_request(ros2: Ros2) -> None:
     shown = ros2('node', 'info', 'talker', '--include-hidden').lines
     assert shown[0] == '/talker'
     assert '    /_hidden_chatter: std_msgs/msg/String' in shown
-
-
-def test_node_info_of_nobody_suggests(ros2: Ros2) -> None:
-    """ros2cli's sentence, then the nearest name."""
-    outcome = ros2('node', 'info', '/taker')
-    assert (outcome.code, outcome.out) == (1, '')
-    assert outcome.err == "Unable to find node '/taker'\nDid you mean '/talker'?\n"
-
-
-def test_topic_list(ros2: Ros2) -> None:
-    """Names, sorted, with their types on request."""
-    outcome = ros2('topic', 'list', '-t')
-    assert outcome.lines == [f'{name} [{type_}]' for name, type_ in TOPICS.items()]
-    assert outcome.code == 0
-
-
-def test_hidden_topics_are_shown_on_request(ros2: Ros2) -> None:
-    """The switch works before and behind the verb; `-c` prints only how many."""
-    assert ros2('topic', '--include-hidden-topics', 'list').lines == ['/_hidden_chatter', *TOPICS]
-    count = ros2('topic', 'list', '--include-hidden-topics', '-c')
-    assert count.out == f'{len(TOPICS) + 1}\n'
 
 
 def test_topic_list_verbose(ros2: Ros2) -> None:
@@ -119,51 +133,11 @@ def test_topic_list_verbose(ros2: Ros2) -> None:
     assert '/chatter' not in subscribed
 
 
-def test_topic_info(ros2: Ros2) -> None:
-    """Type and counts."""
-    expected = 'Type: std_msgs/msg/String\nPublisher count: 1\nSubscription count: 0\n'
-    assert ros2('topic', 'info', '/chatter').out == expected
-
-
 def test_topic_info_verbose(ros2: Ros2) -> None:
     """Each endpoint with node, type hash and QoS."""
     out = ros2('topic', 'info', '-v', '/chatter').out
     head = 'Type: std_msgs/msg/String\n\nPublisher count: 1\n\n'
     assert re.fullmatch(f'{head}{ENDPOINT}\nSubscription count: 0\n\n', out), out
-
-
-def test_topic_info_of_an_unknown_topic_suggests(ros2: Ros2) -> None:
-    """ros2cli's sentence, then the nearest name."""
-    outcome = ros2('topic', 'info', '/chater')
-    assert (outcome.code, outcome.out) == (1, '')
-    assert outcome.err.splitlines()[0] == "Unknown topic '/chater'"
-    assert outcome.err.splitlines()[1].startswith("Did you mean '/chatter'")
-
-
-def test_topic_type(ros2: Ros2) -> None:
-    """The type alone, for pipes into `interface show -`."""
-    assert ros2('topic', 'type', '/joint_states').out == 'sensor_msgs/msg/JointState\n'
-
-
-def test_topic_type_of_an_unknown_topic(ros2: Ros2) -> None:
-    """Exit code 1 with nothing on stdout, as ros2cli; the hint is on stderr."""
-    outcome = ros2('topic', 'type', '/joint_state')
-    assert (outcome.code, outcome.out) == (1, '')
-    assert "'/joint_states'" in outcome.err
-
-
-def test_topic_type_of_a_hidden_topic_needs_the_switch(ros2: Ros2) -> None:
-    """Hidden topics are unknown by default."""
-    assert ros2('topic', 'type', '/_hidden_chatter', '--spin-time', '0.2').code == 1
-    assert ros2('topic', '--include-hidden-topics', 'type', '/_hidden_chatter').code == 0
-
-
-def test_topic_find(ros2: Ros2) -> None:
-    """The topics of a type; none of an unknown type, which is no error."""
-    found = ros2('topic', 'find', 'sensor_msgs/msg/JointState')
-    assert found.lines == ['/joint_states', '/listener/stamped']
-    nothing = ros2('topic', 'find', 'rcl_interfaces/msg/NotAType')
-    assert (nothing.code, nothing.out) == (0, '')
 
 
 def test_service_list(ros2: Ros2) -> None:
@@ -172,32 +146,3 @@ def test_service_list(ros2: Ros2) -> None:
     assert '/trigger [std_srvs/srv/Trigger]' in lines
     assert '/_hidden_service [std_srvs/srv/Trigger]' in lines
     assert lines == sorted(lines)
-
-
-def test_service_type_and_find(ros2: Ros2) -> None:
-    """The type of a name and the names of a type."""
-    assert ros2('service', 'type', '/set_bool').out == 'std_srvs/srv/SetBool\n'
-    assert ros2('service', 'find', 'std_srvs/srv/Trigger').lines == ['/last_received', '/trigger']
-    unknown = ros2('service', 'type', '/set_boll')
-    assert (unknown.code, unknown.out) == (1, '')
-    assert "'/set_bool'" in unknown.err
-
-
-def test_service_info(ros2: Ros2) -> None:
-    """Type and counts, or the sentence of ros2cli."""
-    expected = 'Type: std_srvs/srv/Trigger\nClients count: 0\nServices count: 1\n'
-    assert ros2('service', 'info', '/trigger').out == expected
-    unknown = ros2('service', 'info', '/triger')
-    assert unknown.code == 1
-    assert unknown.err == "Unknown service '/triger'\nDid you mean '/trigger'?\n"
-
-
-def test_an_empty_list_of_actions(ros2: Ros2) -> None:
-    """Nothing and exit code 0; `info` counts none, `type` has exit code 1."""
-    assert ros2('action', 'list').out == ''
-    info = ros2('action', 'info', '/nothing', '--spin-time', '0.2')
-    assert (info.code, info.out) == (
-        0,
-        'Action: /nothing\nAction clients: 0\nAction servers: 0\n',
-    )
-    assert ros2('action', 'type', '/nothing', '--spin-time', '0.2').code == 1

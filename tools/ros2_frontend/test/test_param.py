@@ -12,15 +12,13 @@ import pytest
 pytestmark = [pytest.mark.scenario, pytest.mark.usefixtures('zoo')]
 
 NODE = '/factory/worker'
-NAMES = [
-    'fixed',
-    'gain',
-    'label',
-    'limits.upper',
-    'loose',
-    'start_type_description_service',
-    'use_sim_time',
-]
+NAMES = ['fixed', 'gain', 'label', 'limits.upper', 'loose']
+NAMES += ['start_type_description_service', 'use_sim_time']
+TYPED = """\
+  label (type: string)
+  limits.upper (type: integer array)
+  loose (type: string)
+"""
 DESCRIPTION = """\
 Parameter name: gain
   Type: double
@@ -37,15 +35,22 @@ Parameter name: fixed
 """
 
 
-def test_list_of_one_node(ros2: Ros2) -> None:
-    """Names, sorted, indented; with type, filter and prefix on request."""
-    assert ros2('param', 'list', NODE).lines == [f'  {name}' for name in NAMES]
-    typed = ros2('param', 'list', NODE, '--param-type', '--filter', 'l').lines
-    assert typed == [
-        '  label (type: string)',
-        '  limits.upper (type: integer array)',
-        '  loose (type: string)',
-    ]
+@pytest.mark.parametrize(
+    ('words', 'answer'),
+    [
+        ('list NODE', ''.join(f'  {name}\n' for name in NAMES)),
+        ('list NODE --param-type --filter l', TYPED),
+        ('get NODE fixed', 'Boolean value is: True\n'),
+        ('get NODE gain', 'Double value is: 1.5\n'),
+        ('get NODE limits.upper', "Integer values are: array('q', [1, 2, 3])\n"),
+        ('get factory/worker gain --hide-type', '1.5\n'),
+        ('describe NODE gain fixed', DESCRIPTION),
+    ],
+)
+def test_what_is_there_is_answered_as_by_ros2cli(ros2: Ros2, words: str, answer: str) -> None:
+    """Sorted names, values with their type in words; the leading slash may be left out."""
+    outcome = ros2('param', *words.replace('NODE', NODE).split())
+    assert (outcome.code, outcome.out) == (0, answer)
 
 
 def test_list_of_all_nodes(ros2: Ros2) -> None:
@@ -54,25 +59,6 @@ def test_list_of_all_nodes(ros2: Ros2) -> None:
     heads = [line for line in lines if not line.startswith(' ')]
     assert heads == ['/factory/worker:', '/machine:', '/talker:']
     assert lines[1 : 1 + len(NAMES)] == [f'  {name}' for name in NAMES]
-
-
-@pytest.mark.parametrize(
-    ('name', 'text'),
-    [
-        ('fixed', 'Boolean value is: True'),
-        ('gain', 'Double value is: 1.5'),
-        ('limits.upper', "Integer values are: array('q', [1, 2, 3])"),
-    ],
-)
-def test_get(ros2: Ros2, name: str, text: str) -> None:
-    """The value with its type in words."""
-    outcome = ros2('param', 'get', NODE, name)
-    assert (outcome.code, outcome.out) == (0, f'{text}\n')
-
-
-def test_get_hides_the_type_on_request(ros2: Ros2) -> None:
-    """The value alone; the node's leading slash may be left out."""
-    assert ros2('param', 'get', 'factory/worker', 'gain', '--hide-type').out == '1.5\n'
 
 
 def test_set_is_seen_by_get(ros2: Ros2) -> None:
@@ -96,11 +82,6 @@ def test_delete(ros2: Ros2) -> None:
     assert refused.err == 'Deleting parameter failed: Static parameter cannot be undeclared\n'
     ros2('param', 'set', NODE, 'loose', 'x')
     assert ros2('param', 'delete', NODE, 'fixed').err.startswith('Deleting parameter failed: ')
-
-
-def test_describe(ros2: Ros2) -> None:
-    """Type, text, range and the rest."""
-    assert ros2('param', 'describe', NODE, 'gain', 'fixed').out == DESCRIPTION
 
 
 def test_dump_can_be_loaded(ros2: Ros2, tmp_path: Path) -> None:

@@ -23,33 +23,31 @@ def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return over
 
 
-@pytest.mark.usefixtures('prefix')
-def test_list_is_sorted_and_without_repetition(ros2: Ros2) -> None:
-    """Each package once."""
-    assert ros2('pkg', 'list').lines == ['plain_pkg', 'tools_pkg']
-
-
-def test_executables(ros2: Ros2, prefix: Path) -> None:
-    """Executable files of the package's lib folder, in depth, of the first prefix only."""
-    assert ros2('pkg', 'executables', 'tools_pkg').lines == ['tools_pkg deep', 'tools_pkg work']
-    assert ros2('pkg', 'executables').lines == ['tools_pkg deep', 'tools_pkg work']
-    full = ros2('pkg', 'executables', 'tools_pkg', '--full-path').lines
-    assert full == [str(prefix / 'lib/tools_pkg/sub/deep'), str(prefix / 'lib/tools_pkg/work')]
-
-
-def test_prefix(ros2: Ros2, prefix: Path) -> None:
-    """The prefix, or the package's share folder."""
-    assert ros2('pkg', 'prefix', 'tools_pkg').out == f'{prefix}\n'
-    share = ros2('pkg', 'prefix', 'tools_pkg', '--share')
-    assert share.out == f'{prefix}/share/tools_pkg\n'
+@pytest.mark.parametrize(
+    ('words', 'answer'),
+    [
+        ('list', 'plain_pkg\ntools_pkg\n'),
+        ('executables tools_pkg', 'tools_pkg deep\ntools_pkg work\n'),
+        ('executables', 'tools_pkg deep\ntools_pkg work\n'),
+        (
+            'executables tools_pkg --full-path',
+            'OVER/lib/tools_pkg/sub/deep\nOVER/lib/tools_pkg/work\n',
+        ),
+        ('prefix tools_pkg', 'OVER\n'),
+        ('prefix tools_pkg --share', 'OVER/share/tools_pkg\n'),
+        ('xml plain_pkg --tag version', '1.2.3\n'),
+        ('xml plain_pkg -t depend', 'one\ntwo\n'),
+    ],
+)
+def test_what_is_there(ros2: Ros2, prefix: Path, words: str, answer: str) -> None:
+    """Sorted, without repetition; executable files in depth, of the first prefix only."""
+    assert ros2('pkg', *words.split()).out == answer.replace('OVER', str(prefix))
 
 
 @pytest.mark.usefixtures('prefix')
 def test_xml(ros2: Ros2) -> None:
-    """The manifest, or the texts of one of its tags."""
+    """The whole manifest."""
     assert ros2('pkg', 'xml', 'plain_pkg').out.startswith('<package format="3">\n  <name>plain')
-    assert ros2('pkg', 'xml', 'plain_pkg', '--tag', 'version').out == '1.2.3\n'
-    assert ros2('pkg', 'xml', 'plain_pkg', '-t', 'depend').lines == ['one', 'two']
 
 
 @pytest.mark.usefixtures('prefix')
@@ -58,10 +56,7 @@ def test_xml(ros2: Ros2) -> None:
     [
         (('prefix', 'tool_pkg'), "Package not found\nDid you mean 'tools_pkg'?\n"),
         (('xml', 'tool_pkg'), "Package not found\nDid you mean 'tools_pkg'?\n"),
-        (
-            ('executables', 'tool_pkg'),
-            "Package 'tool_pkg' not found\nDid you mean 'tools_pkg'?\n",
-        ),
+        (('executables', 'tool_pkg'), "Package 'tool_pkg' not found\nDid you mean 'tools_pkg'?\n"),
         (('xml', 'plain_pkg', '-t', 'nothing'), 'XML tag not found\n'),
     ],
 )

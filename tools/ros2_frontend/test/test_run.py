@@ -118,14 +118,8 @@ def test_sigpipe_is_as_the_shell_gave_it(env: Mapping[str, str]) -> None:
     ('words', 'message'),
     [
         (('dmo', 'x'), "Package 'dmo' not found\nDid you mean 'demo'?\n"),
-        (
-            ('demo', 'print_argument'),
-            "No executable found\nDid you mean 'print_arguments'?\n",
-        ),
-        (
-            ('demo', 'zzz'),
-            f'No executable found\ndemo has: {EVERYTHING}\n',
-        ),
+        (('demo', 'print_argument'), "No executable found\nDid you mean 'print_arguments'?\n"),
+        (('demo', 'zzz'), f'No executable found\ndemo has: {EVERYTHING}\n'),
         (
             ('empty', 'x'),
             "No executable found\nPackage 'empty' has no executables; is it built?\n",

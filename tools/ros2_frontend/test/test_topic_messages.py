@@ -32,16 +32,20 @@ effort: \\[\\]
 """
 
 
-def test_echo_prints_yaml(ros2: Ros2) -> None:
-    """One message, as ros2cli prints it."""
-    outcome = ros2('topic', 'echo', '/joint_states', '--once')
+@pytest.mark.parametrize(
+    ('words', 'printed'),
+    [
+        ('/joint_states --once', JOINTS),
+        ('/latched --once', 'data: kept\n---\n'),  # durability is chosen by its publisher
+        ("/chatter --once --filter m.data.endswith('7')", r"data: 'Hello World: \d*7'\n---\n"),
+        ('/listener/input std_msgs/msg/String --timeout 0.1', ''),  # the end of the wait
+    ],
+)
+def test_echo_prints_yaml(ros2: Ros2, words: str, printed: str) -> None:
+    """One message, as ros2cli prints it; a filter, and what was published before."""
+    outcome = ros2('topic', 'echo', *words.split())
     assert (outcome.code, outcome.err) == (0, '')
-    assert re.fullmatch(JOINTS, outcome.out), outcome.out
-
-
-def test_echo_gets_what_was_published_before(ros2: Ros2) -> None:
-    """A latched topic: durability is chosen by its publisher."""
-    assert ros2('topic', 'echo', '/latched', '--once').out == 'data: kept\n---\n'
+    assert re.fullmatch(printed, outcome.out), outcome.out
 
 
 def test_echo_of_publishers_that_differ(ros2: Ros2) -> None:
@@ -52,18 +56,6 @@ def test_echo_of_publishers_that_differ(ros2: Ros2) -> None:
         'to QoSReliabilityPolicy.BEST_EFFORT as it will connect to all publishers'
     )
     assert lines[1].startswith('data: ')
-
-
-def test_echo_filter(ros2: Ros2) -> None:
-    """Only what the expression accepts is printed."""
-    out = ros2('topic', 'echo', '/chatter', '--once', '--filter', "m.data.endswith('7')").out
-    assert re.fullmatch(r"data: 'Hello World: \d*7'\n---\n", out)
-
-
-def test_echo_timeout_without_a_message(ros2: Ros2) -> None:
-    """The end of the wait is no error, as in ros2cli."""
-    outcome = ros2('topic', 'echo', '/listener/input', 'std_msgs/msg/String', '--timeout', '0.1')
-    assert (outcome.code, outcome.out, outcome.err) == (0, '', '')
 
 
 @pytest.mark.parametrize(
@@ -182,10 +174,7 @@ def test_pub_until_interrupted(zoo: Mapping[str, str]) -> None:
             ('--once', '--max-wait-time-secs', '0.1', 'std_msgs/msg/String'),
             'Timed out waiting for subscribers: Expected 1 subcribers but only got 0',
         ),
-        (
-            ('std_msgs/msg/String', '-n', 'not valid'),
-            'Invalid node name: node name must not',
-        ),
+        (('std_msgs/msg/String', '-n', 'not valid'), 'Invalid node name: node name must not'),
     ],
     ids=['type', 'no mapping', 'field', 'nobody', 'node name'],
 )
