@@ -29,12 +29,6 @@ PACKAGES = [
 ]
 
 
-@pytest.fixture(autouse=True)
-def complete_system(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A system that lacks nothing."""
-    monkeypatch.setattr('workspace.environment.check', lambda *_: None)
-
-
 def built(environment: Environment, fake: Fake) -> Path:
     """Bring everything up to date; return the installation."""
     carry_out(plan(environment, Target()), fake())

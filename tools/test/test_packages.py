@@ -28,15 +28,6 @@ def test_packages_are_found_where_colcon_finds_them(layout: Layout, add_package:
     assert sorted(find_packages(layout.root)) == ['arm', 'tf2_msgs']
 
 
-def test_manifest_is_read(add_package: Add) -> None:
-    """Kind, dependencies and whether a package stands in for a public one."""
-    folder = add_package('tf2_msgs', 'std_msgs', folder='interfaces', build_type='ament_cmake')
-    package = read_package(folder / 'package.xml')
-    assert package.dependencies == {'std_msgs'}
-    assert package.is_interface
-    assert package.is_copy
-
-
 def test_a_target_gets_what_it_needs_in_order(
     layout: Layout, add_package: Add, empty: Underlay
 ) -> None:
@@ -100,36 +91,27 @@ def test_unknown_target_is_answered_with_the_known(
 @pytest.mark.parametrize(
     ('build_type', 'name', 'counts'),
     [
-        ('ament_cmake', 'msg/A.msg', True),
-        ('ament_python', 'setup.py', True),
-        ('ament_python', 'pkg/core.py', False),
-        ('ament_python', 'robots/arm.urdf', False),
-        ('ament_python', 'pkg/__pycache__/core.pyc', False),
+        ('ament_cmake', 'msg/A.msg', 'contents'),
+        ('ament_python', 'setup.py', 'contents'),
+        ('ament_python', 'robots/arm.urdf', 'presence'),
+        ('ament_python', 'pkg/core.py', ''),
+        ('ament_python', 'pkg/__pycache__/core.pyc', ''),
     ],
 )
 def test_contents_count_where_they_are_copied(
-    add_package: Add, build_type: str, name: str, counts: bool
+    add_package: Add, build_type: str, name: str, counts: str
 ) -> None:
-    """Messages and build files count by content; linked files of a Python package do not."""
+    """Of messages and build files; setup.py has to link a new data file, but no new module."""
     folder = add_package('pkg', build_type=build_type)
-    path = folder / name
+    package, path = read_package(folder / 'package.xml'), folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
-    package = read_package(folder / 'package.xml')
-    path.write_text('one')
-    before = source_fingerprint(package)
-    path.write_text('two')
-    assert (source_fingerprint(package) != before) == counts
-
-
-def test_a_new_data_file_counts(add_package: Add) -> None:
-    """setup.py has to link it; a new module is linked with its folder."""
-    folder = add_package('pkg')
-    package = read_package(folder / 'package.xml')
-    before = source_fingerprint(package)
-    (folder / 'module.py').touch()
-    assert source_fingerprint(package) == before
-    (folder / 'robot.urdf').touch()
-    assert source_fingerprint(package) != before
+    path.unlink(missing_ok=True)
+    seen = []
+    for text in (None, 'one', 'two'):
+        if text is not None:
+            path.write_text(text)
+        seen.append(source_fingerprint(package))
+    assert (seen[0] != seen[1], seen[1] != seen[2]) == (counts != '', counts == 'contents')
 
 
 @pytest.mark.parametrize('build_type', ['ament_cmake', 'ament_python'])

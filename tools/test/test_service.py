@@ -40,21 +40,17 @@ def test_a_unit_is_well_formed(unit: Path) -> None:
 
 
 @pytest.mark.parametrize('unit', UNITS, ids=lambda unit: str(unit.name))
-def test_starts_that_fail_come_to_their_limit(unit: Path) -> None:
-    """Also when each attempt takes as long as it may, as with drives that are off."""
+def test_restarts_move_nothing_and_come_to_their_limit(unit: Path) -> None:
+    """No drive is enabled, a robot's processes get the signal in their own order.
+
+    The limit counts also when each attempt takes as long as it may, as with drives that are off.
+    """
     parser = read(unit)
-    service = parser['Service']
-    attempt = sum(int(service[key]) for key in ('TimeoutStartSec', 'TimeoutStopSec', 'RestartSec'))
-    limit = parser['Unit']
-    assert int(limit['StartLimitIntervalSec']) > int(limit['StartLimitBurst']) * attempt
-
-
-@pytest.mark.parametrize('unit', UNITS, ids=lambda unit: str(unit.name))
-def test_a_restart_moves_nothing(unit: Path) -> None:
-    """It enables no drive, and a robot's processes get the signal in their own order."""
-    service = read(unit)['Service']
+    limit, service = parser['Unit'], parser['Service']
     assert '--enable' not in service['ExecStart']
     assert service['KillMode'] == 'mixed'
+    attempt = sum(int(service[key]) for key in ('TimeoutStartSec', 'TimeoutStopSec', 'RestartSec'))
+    assert int(limit['StartLimitIntervalSec']) > int(limit['StartLimitBurst']) * attempt
 
 
 def test_the_device_of_a_unit_is_one_that_the_rules_make() -> None:

@@ -19,16 +19,10 @@ pytestmark = pytest.mark.slow
 TOOLS = this_checkout().root / 'tools'
 
 
-def workspace(*arguments: str, **environ: str) -> 'subprocess.CompletedProcess[str]':
+def workspace(*arguments: str) -> 'subprocess.CompletedProcess[str]':
     """Run the set-up's program."""
-    return subprocess.run(
-        [sys.executable, '-m', 'workspace', *arguments],
-        cwd=TOOLS,
-        env={**os.environ, **environ},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    words = [sys.executable, '-m', 'workspace', *arguments]
+    return subprocess.run(words, cwd=TOOLS, capture_output=True, text=True, check=False)
 
 
 def test_old_pythons_can_read_the_start() -> None:
@@ -68,28 +62,22 @@ def test_other_systems_are_refused_in_one_sentence(
     assert words in capsys.readouterr().err
 
 
-def test_wrong_python_is_an_error_without_traceback() -> None:
-    """`make PYTHON=nothing` ends with words and exit code 1."""
-    done = workspace('--python', '/nonexistent/python', 'missing')
-    assert done.returncode == 1
-    assert done.stderr.startswith('error: /nonexistent/python does not start.')
+@pytest.mark.parametrize(
+    ('words', 'code', 'problem'),
+    [
+        (['--python', '/nonexistent/python', 'missing'], 1, 'error: /nonexistent/python does not'),
+        (['build', 'no_such_package'], 1, 'no package no_such_package'),
+        ([], 2, 'usage: workspace'),
+        (['unknown'], 2, 'usage: workspace'),
+        (['build', '--unknown'], 2, 'usage: workspace'),
+    ],
+)
+def test_wrong_arguments_are_no_traceback(words: list[str], code: int, problem: str) -> None:
+    """They are named before anything is done."""
+    done = workspace(*words)
+    assert done.returncode == code
+    assert problem in done.stderr
     assert 'Traceback' not in done.stderr
-
-
-def test_wrong_package_is_an_error_without_traceback() -> None:
-    """A package that is not there is named before anything is done."""
-    done = workspace('build', 'no_such_package')
-    assert done.returncode == 1
-    assert 'no package no_such_package' in done.stderr
-    assert 'Traceback' not in done.stderr
-
-
-@pytest.mark.parametrize('arguments', [[], ['unknown'], ['build', '--unknown']])
-def test_usage_errors(arguments: list[str]) -> None:
-    """Wrong arguments end with code 2 and the usage."""
-    done = workspace(*arguments)
-    assert done.returncode == 2
-    assert 'usage: workspace' in done.stderr
 
 
 def test_demo_passes_the_duration_on() -> None:

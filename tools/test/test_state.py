@@ -6,14 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from workspace.layout import (
-    EnvironmentState,
-    fingerprint,
-    fingerprint_files,
-    read_state,
-    write_atomically,
-    write_state,
-)
+from workspace.layout import fingerprint, fingerprint_files, read_state
 
 PARTS = st.lists(st.text(max_size=5), max_size=4)
 
@@ -32,23 +25,6 @@ def test_fingerprint_of_files_sees_contents_and_absence(tmp_path: Path) -> None:
         path.write_text(text)
         seen.append(fingerprint_files([path]))
     assert len(set(seen)) == 3
-
-
-def test_writing_breaks_hard_links(tmp_path: Path) -> None:
-    """What a cache holds under another name stays as it was."""
-    cached, installed = tmp_path / 'cached', tmp_path / 'installed'
-    cached.write_text('old')
-    installed.hardlink_to(cached)
-    write_atomically(installed, 'new')
-    assert (cached.read_text(), installed.read_text()) == ('old', 'new')
-    assert sorted(tmp_path.iterdir()) == [cached, installed]
-
-
-def test_state_round_trip(tmp_path: Path) -> None:
-    """What is written is read."""
-    state = EnvironmentState('base', {'dev': 'mark'}, '/usr/bin/python3')
-    write_state(tmp_path / 'state', state)
-    assert read_state(tmp_path / 'state') == state
 
 
 @pytest.mark.parametrize('text', ['', '{', '[]', '{"base": "x"}', '{"other": 1}', 'null'])
