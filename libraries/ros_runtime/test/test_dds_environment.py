@@ -25,6 +25,7 @@ from dds_network.environment import profile_file, profile_text
 from dds_network.reach import has_link, LOCALHOST_PROFILE, read_interfaces, resolve_reach
 from dds_network.shell import main
 
+OWN = [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
 OPEN = Reach((Interface('eth0', '10.0.0.5'),), ('10.0.0.9',))
 
 
@@ -91,9 +92,7 @@ def test_the_option_goes_before_the_variable() -> None:
     assert is_this_host(environ)
 
 
-@pytest.mark.parametrize(
-    'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
-)
+@pytest.mark.parametrize('own', OWN)
 def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
     """It decides, and nothing reports that DDS stays on this host."""
     environ = dict(own)
@@ -103,9 +102,7 @@ def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize('named', ['lo', 'localhost', 'no.such.interface.invalid'])
-@pytest.mark.parametrize(
-    'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
-)
+@pytest.mark.parametrize('own', OWN)
 def test_a_choice_that_would_be_ignored_is_refused(own: dict[str, str], named: str) -> None:
     """By the variable or by --network, which would have no effect."""
     environ = {NETWORK_VARIABLE: named, **own}

@@ -76,6 +76,20 @@ def send(client: RosClient) -> Any:
     return caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
 
 
+def begin(client: RosClient, begun: list[ServedGoal]) -> Any:
+    """Send a goal; return its handle when it has been accepted and has begun."""
+    sent = send(client)
+    client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
+    return sent.result()
+
+
+def result_of(client: RosClient, goal: Any) -> Any:
+    """Return status and result of a goal when it has ended."""
+    result = goal.get_result_async()
+    client.spin_until(result.done, TIMEOUT, 'a result')
+    return result.result()
+
+
 @pytest.mark.slow
 def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
     isolation: Isolation, monkeypatch: pytest.MonkeyPatch
@@ -86,22 +100,15 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
 
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, begun.append)
-
-        def result_of(goal: Any) -> Any:
-            result = goal.get_result_async()
-            client.spin_until(result.done, TIMEOUT, 'a result')
-            return result.result()
-
-        sent = send(client)
-        client.spin_until(sent.done, TIMEOUT, 'acceptance')
-        goal = sent.result()
-        client.spin_until(lambda: bool(begun), TIMEOUT, 'the start')
+        goal = begin(client, begun)
         assert begun[0].handle.status == GoalStatus.STATUS_EXECUTING
         server.end(begun[0])
-        assert result_of(goal).status == GoalStatus.STATUS_SUCCEEDED
-        client.spin_until(
-            lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
-        )
+        assert result_of(client, goal).status == GoalStatus.STATUS_SUCCEEDED
+
+        def is_forgotten() -> bool:
+            return bool(result_of(client, goal).status == GoalStatus.STATUS_UNKNOWN)
+
+        client.spin_until(is_forgotten, TIMEOUT, 'its end')
         server.destroy()
 
 
@@ -146,17 +153,14 @@ def test_a_goal_ends_once_with_the_status_of_its_server(
     begun: list[ServedGoal] = []
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, begun.append, ending)
-        sent = send(client)
-        client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
+        goal = begin(client, begun)
         assert server.running == begun
         if is_canceled:
-            sent.result().cancel_goal_async()
+            goal.cancel_goal_async()
         else:
             server.end(begun[0])
             server.end(begun[0])
-        result = sent.result().get_result_async()
-        client.spin_until(result.done, TIMEOUT, 'a result')
-        assert result.result().status == status
+        assert result_of(client, goal).status == status
         assert not server.running
         server.destroy()
 
@@ -207,9 +211,7 @@ def test_a_cancel_of_all_goals_counts_for_one_that_is_not_accepted_yet(
         client.spin_until(cancel.done, TIMEOUT, 'the answer to the cancel')
         assert not sent.done()
         client.spin_until(sent.done, TIMEOUT, 'acceptance')
-        result = sent.result().get_result_async()
-        client.spin_until(result.done, TIMEOUT, 'a result')
-        assert result.result().status == GoalStatus.STATUS_CANCELED
+        assert result_of(client, sent.result()).status == GoalStatus.STATUS_CANCELED
         server.destroy()
 
 
@@ -240,17 +242,14 @@ def test_a_goal_that_fails_is_aborted_with_the_reason(
 
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, start, None)
-        sent = send(client)
-        client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
+        goal = begin(client, begun)
         if wrong is None:
-            cancel = sent.result().cancel_goal_async()
+            cancel = goal.cancel_goal_async()
             client.spin_until(cancel.done, TIMEOUT, 'an answer')
             assert not cancel.result().goals_canceling
-        result = sent.result().get_result_async()
-        client.spin_until(result.done, TIMEOUT, 'a result')
-        assert result.result().status == GoalStatus.STATUS_ABORTED
-        assert result.result().result.error.error == 9
-        assert result.result().result.error.error_string == reason
+        answer = result_of(client, goal)
+        assert answer.status == GoalStatus.STATUS_ABORTED
+        assert answer.result.error == TF2Error(error=9, error_string=reason)
         assert not server.running
         server.destroy()
     assert ('Traceback' in capfd.readouterr().err) == is_logged

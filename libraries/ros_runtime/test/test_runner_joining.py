@@ -27,36 +27,32 @@ def unset(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
+@pytest.mark.parametrize(
+    ('variable', 'value', 'said'),
+    [
+        (NETWORK_VARIABLE, 'eth0', 'DDS is open on eth0 (10.0.0.5)'),
+        (PROFILE_VARIABLE, '/home/me/dds.xml', '/home/me/dds.xml decides'),
+        (NETWORK_VARIABLE, '', ''),
+    ],
+)
 def test_a_process_that_others_can_reach_says_so(
-    unset: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    unset: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    variable: str,
+    value: str,
+    said: str,
 ) -> None:
-    """However it was started."""
+    """However it was started, or that a person's profile decides; nothing by default."""
 
     def resolve(*_: Any) -> Reach:
-        return Reach((Interface('eth0', '10.0.0.5'),))
+        return Reach((Interface('eth0', '10.0.0.5'),)) if value else Reach()
 
     unset.setattr('dds_network.environment.resolve_reach', resolve)
-    unset.setenv(NETWORK_VARIABLE, 'eth0')
+    if value:
+        unset.setenv(variable, value)
     init_ros()
-    assert 'DDS is open on eth0 (10.0.0.5)' in capfd.readouterr().err
-
-
-def test_a_profile_of_a_person_is_named(
-    unset: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Its reach is unknown."""
-    unset.setenv(PROFILE_VARIABLE, '/home/me/dds.xml')
-    init_ros()
-    assert '/home/me/dds.xml decides' in capfd.readouterr().err
-
-
-def test_a_process_of_this_host_says_nothing(
-    unset: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """That is the default."""
-    del unset
-    init_ros()
-    assert capfd.readouterr().err == ''
+    error = capfd.readouterr().err
+    assert said in error if said else error == ''
 
 
 @pytest.mark.parametrize(

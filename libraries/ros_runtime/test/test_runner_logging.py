@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import logging
 import signal
 import threading
 import time
+from types import SimpleNamespace
 
 from isolation import Isolation
 import pytest
@@ -45,36 +46,22 @@ class Sink:
         self.open = threading.Event()
         self.lines: list[tuple[str, str]] = []
 
-    def _take(self, level: str, message: str) -> None:
-        assert self.open.wait(TIMEOUT)
-        self.lines.append((level, message))
+    def __getattr__(self, level: str) -> Callable[[str], None]:
+        """Return the method of a level."""
 
-    def info(self, message: str) -> None:
-        """Log."""
-        self._take('info', message)
+        def take(message: str) -> None:
+            assert self.open.wait(TIMEOUT)
+            self.lines.append((level, message))
 
-    def warning(self, message: str) -> None:
-        """Log."""
-        self._take('warning', message)
-
-    def error(self, message: str) -> None:
-        """Log."""
-        self._take('error', message)
-
-    def fatal(self, message: str) -> None:
-        """Log."""
-        self._take('fatal', message)
+        return take
 
 
-class FakeNode:
-    """Has a logger only."""
-
-    def __init__(self, sink: Sink) -> None:
-        self._sink = sink
-
-    def get_logger(self) -> Sink:
-        """Return the sink."""
-        return self._sink
+def bridge_into(sink: Sink, burst: int) -> RosLogBridge:
+    """Begin to log into a sink, as a node does."""
+    bridge = RosLogBridge('test', limit=LogRateLimit(burst=burst))
+    bridge.start()
+    log_as(SimpleNamespace(get_logger=lambda: sink))  # type: ignore[arg-type]
+    return bridge
 
 
 @pytest.fixture
@@ -86,9 +73,7 @@ def sink() -> Sink:
 @pytest.fixture
 def bridge(sink: Sink) -> Iterator[RosLogBridge]:
     """Serve a bridge into the sink, which is closed by the test or afterwards."""
-    bridge = RosLogBridge('test', limit=LogRateLimit(burst=10 * QUEUE_LENGTH))
-    bridge.start()
-    log_as(FakeNode(sink))  # type: ignore[arg-type]
+    bridge = bridge_into(sink, 10 * QUEUE_LENGTH)
     yield bridge
     sink.open.set()
     bridge.close()
@@ -132,9 +117,7 @@ def test_a_flood_is_cut_and_counted() -> None:
     """A defect in each cycle logs a burst, and then how often it came."""
     sink = Sink()
     sink.open.set()
-    bridge = RosLogBridge('test', limit=LogRateLimit(burst=5))
-    bridge.start()
-    log_as(FakeNode(sink))  # type: ignore[arg-type]
+    bridge = bridge_into(sink, 5)
     for _ in range(100):
         logging.getLogger('arm_canopen.master.runner').error('a defect in the CANopen cycle')
     bridge.close()

@@ -140,11 +140,8 @@ def test_misspelt_names(isolation: Isolation) -> None:
             refuse_misspelt(node)
 
 
-@pytest.mark.parametrize('name', ['gate', 'speeds', 'x', ''])
-def test_other_names_are_left_alone(name: str) -> None:
+def test_other_names_are_left_alone() -> None:
     """Short names that differ in a letter may well be meant for another node."""
-    if name == 'speeds':
-        with pytest.raises(ParameterError, match='speed'):
-            refuse_similar([name], ['speed'])
-    else:
-        refuse_similar([name], ['rate', 'speed'])
+    refuse_similar(['gate', 'x', ''], ['rate', 'speed'])
+    with pytest.raises(ParameterError, match='speed'):
+        refuse_similar(['speeds'], ['speed'])

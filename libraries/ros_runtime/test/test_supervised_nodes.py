@@ -84,7 +84,8 @@ def test_option_or_variable_turn_it_off(
 
 
 def test_the_robot_needs_no_page(tmp_path: Path) -> None:
-    """It is neither required nor awaited, ends soon, and comes after what moves the robot."""
+    """Not required, not awaited, ends soon, after what moves the robot; may not be built."""
+    assert view_process(lambda *_: None, RosOptions(), ready_timeout=7.0, stop_order=1) is None
     program = tmp_path / 'web_viewer'
     program.touch(mode=0o755)
     ros = RosOptions('left', ('-p', 'port:=9000'))
@@ -97,11 +98,6 @@ def test_the_robot_needs_no_page(tmp_path: Path) -> None:
     assert spec.argv[0] == 'nice'
     assert spec.argv[spec.argv.index('-p') + 1] == 'frame_prefix:=left/'
     assert spec.argv[-2:] == ('-p', 'port:=9000')
-
-
-def test_no_page_where_it_is_not_built() -> None:
-    """And no error: the robot is the same without."""
-    assert view_process(lambda *_: None, RosOptions(), ready_timeout=7.0, stop_order=1) is None
 
 
 def test_times_of_the_command_line() -> None:

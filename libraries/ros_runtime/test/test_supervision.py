@@ -65,6 +65,7 @@ def spec(name: str, **options: object) -> ProcessSpec:
 
 MASTER = spec('master')
 SLAVES = spec('slaves', stop_order=2)
+STOP = ('master', Signals.SIGTERM)
 
 
 def test_all_start_at_once_and_running_means_all_are_ready() -> None:
@@ -92,15 +93,22 @@ def test_not_ready_in_time_stops_all_and_names_the_process_and_its_last_lines() 
     assert bench.outcome.last_lines == ('waiting for panda_joint3',)
 
 
-def test_one_that_is_not_required_and_late_is_no_longer_waited_for() -> None:
-    """All is ready without it, and a warning names it."""
-    bench = Bench(MASTER, spec('viewer', required=False))
+@pytest.mark.parametrize('awaited', [True, False])
+def test_what_is_not_required_and_late_is_reported_once_and_may_still_come(
+    *, awaited: bool
+) -> None:
+    """A warning when its time is over, all is ready without it; then what it says of itself."""
+    bench = Bench(MASTER, spec('viewer', required=False, awaited=awaited))
     bench.supervision.ready('master', 1.0)
-    assert bench.supervision.waiting == ('viewer',)
+    assert bench.supervision.waiting == (('viewer',) if awaited else ())
+    assert bench.supervision.next_deadline() == 10.0
     bench.supervision.advance(10.0)
     assert bench.supervision.phase is Phase.RUNNING
     late = 'viewer did not get ready within 10 s; going on without it'
     assert Notice(Severity.WARNING, late, 'viewer') in bench.notices
+    assert bench.supervision.next_deadline() is None
+    bench.supervision.ready('viewer', 12.0, 'seen')
+    assert bench.notices[-1].text == 'seen'
 
 
 def test_an_infinite_timeout_waits_for_ever() -> None:
@@ -112,8 +120,7 @@ def test_an_infinite_timeout_waits_for_ever() -> None:
 
 
 @pytest.mark.parametrize(
-    ('returncode', 'words'),
-    [(3, 'exit code 3'), (0, 'ended'), (-11, 'SIGSEGV'), (-50, '50')],
+    ('returncode', 'words'), [(3, 'exit code 3'), (0, 'ended'), (-11, 'SIGSEGV'), (-50, '50')]
 )
 def test_the_end_of_a_required_process_ends_all(returncode: int, words: str) -> None:
     """Whatever way it ends, also with exit code 0, the rest is stopped and the exit code is 1."""
@@ -146,32 +153,26 @@ def test_a_second_interrupt_kills_everybody_and_is_no_success() -> None:
     assert 'master had to be killed' in bench.outcome.reason
 
 
-def test_an_echo_of_an_interrupt_kills_nobody() -> None:
-    """Two signals a few milliseconds apart are one: drives come to rest and are disabled."""
-    bench = Bench(SLAVES, MASTER)
-    bench.supervision.interrupt(5.0)
-    bench.supervision.interrupt(5.003)
-    bench.supervision.interrupt(5.49)
-    assert bench.sent == [('master', Signals.SIGTERM)]
+@pytest.mark.parametrize('is_taken', [False, True])
+def test_an_echo_of_an_interrupt_does_nothing(*, is_taken: bool) -> None:
+    """Two signals a few milliseconds apart are one: drives come to rest and are disabled.
 
-
-def test_the_first_interrupt_can_be_taken_over() -> None:
-    """Then its echo does nothing either; the next interrupt stops, and the one after it kills."""
+    The first interrupt can be taken over; the next one stops, and the one after it kills.
+    """
     calls: list[int] = []
 
     def take() -> bool:
         calls.append(1)
-        return True
+        return is_taken
 
-    bench = Bench(MASTER, on_interrupt=take)
-    bench.supervision.interrupt(5.0)
-    bench.supervision.interrupt(5.003)
-    assert (calls, bench.sent) == ([1], [])
-    bench.supervision.interrupt(6.0)
-    bench.supervision.interrupt(6.003)
-    assert (calls, bench.sent) == ([1], [('master', Signals.SIGTERM)])
+    bench = Bench(SLAVES, MASTER, on_interrupt=take)
+    for begin, sent in ((5.0, [] if is_taken else [STOP]), (6.0, [STOP] if is_taken else None)):
+        if sent is not None:
+            for echo in (0.0, 0.003, 0.49):
+                bench.supervision.interrupt(begin + echo)
+            assert (calls, bench.sent) == ([1], sent)
     bench.supervision.interrupt(7.0)
-    assert bench.sent[-1] == ('master', Signals.SIGKILL)
+    assert {('master', Signals.SIGKILL), ('slaves', Signals.SIGKILL)} < set(bench.sent)
 
 
 def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:
@@ -277,19 +278,6 @@ def test_an_optional_process_that_ends_is_started_again() -> None:
     assert bench.supervision.running == ('master',)
 
 
-def test_what_is_not_awaited_and_late_is_reported_once_and_may_still_come() -> None:
-    """A warning when its time is over, although all is ready; then what it says of itself."""
-    bench = Bench(MASTER, spec('viewer', required=False, awaited=False))
-    bench.supervision.ready('master', 1.0)
-    assert bench.supervision.next_deadline() == 10.0
-    bench.supervision.advance(10.0)
-    late = 'viewer did not get ready within 10 s; going on without it'
-    assert bench.notices[-1] == Notice(Severity.WARNING, late, 'viewer')
-    assert bench.supervision.next_deadline() is None
-    bench.supervision.ready('viewer', 12.0, 'seen')
-    assert bench.notices[-1].text == 'seen'
-
-
 @pytest.mark.parametrize('required', [True, False])
 def test_only_what_is_required_makes_a_failure_of_being_killed(*, required: bool) -> None:
     """A page that hangs is killed, and the robot has ended well all the same."""
@@ -341,8 +329,7 @@ class Play:
 
 names = st.sampled_from(['master', 'joint_states', 'slaves', 'viewer'])
 deaths = st.tuples(
-    st.sampled_from([Signals.SIGINT, Signals.SIGTERM, Signals.SIGKILL, None]),
-    st.floats(0, 0.9),
+    st.sampled_from([Signals.SIGINT, Signals.SIGTERM, Signals.SIGKILL, None]), st.floats(0, 0.9)
 )
 
 

@@ -15,7 +15,7 @@ import threading
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import join_in_time, LineWriter, Outcome, Shutdown, supervise, terminal
+from process_supervisor import LineWriter, Outcome, Shutdown, supervise, terminal
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -186,13 +186,6 @@ thread.start()
 print(terminal.join_in_time(thread))
 sys.exit(0)
 """
-
-
-def test_a_thread_that_has_ended_is_nothing_to_talk_about() -> None:
-    """The program goes on."""
-    thread = threading.Thread(target=lambda: None, daemon=True)
-    thread.start()
-    assert not join_in_time(thread)
 
 
 def test_a_program_ends_without_a_thread_that_hangs() -> None:

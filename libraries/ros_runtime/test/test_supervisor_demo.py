@@ -22,9 +22,7 @@ from process_supervisor import (
     Phase,
     Severity,
 )
-from process_supervisor import (
-    demo as demo_module,
-)
+from process_supervisor import demo as demo_module
 from process_supervisor.demo import Demo, run_demo, second_terminal
 
 
@@ -118,8 +116,7 @@ def screen(
     ids=['terminal', 'pipe', 'dumb', 'no unicode', 'narrow', 'low'],
 )
 def test_the_table_is_for_terminals_that_have_room_for_it(
-    monkeypatch: pytest.MonkeyPatch,
-    case: tuple[io.StringIO, bool, str, tuple[int, int], bool],
+    monkeypatch: pytest.MonkeyPatch, case: tuple[io.StringIO, bool, str, tuple[int, int], bool]
 ) -> None:
     """Everything else gets lines; a line says so where the terminal is too small."""
     file, terminal, term, size, is_table = case

@@ -74,22 +74,6 @@ def test_signal_handlers_are_given_back() -> None:
     assert signal.set_wakeup_fd(-1) == -1
 
 
-def test_a_process_that_dies_early_ends_all_and_is_quoted() -> None:
-    """Standard error belongs to what it wrote last."""
-    watch = Watch(program('good'), program('dies', notifies_ready=True), when_ready=nothing)
-    outcome = watch.run()
-    assert outcome.exit_code == 1
-    assert outcome.reason == 'dies ended with exit code 7 before it was ready'
-    assert outcome.last_lines == ('first words', 'last words')
-
-
-def test_a_deaf_process_is_killed_and_that_is_no_success() -> None:
-    """The ladder ends with SIGKILL; the exit code says that it was needed."""
-    outcome = Watch(program('deaf', notifies_ready=True), when_ready=ctrl_c).run()
-    assert outcome.exit_code == 1
-    assert outcome.reason == 'deaf had to be killed'
-
-
 def test_a_python_program_that_hangs_says_what_it_does() -> None:
     """Before it is killed, by SIGABRT."""
     deaf = program('deaf', notifies_ready=True)
@@ -242,6 +226,7 @@ def test_no_process_outlives_its_supervisor(number: signal.Signals, tmp_path: Pa
             assert set(pids) == {'supervisor', 'guardian', 'master', 'slaves'}
             supervisor.stdout.read()
             assert wait_for_end(pids.values()) == []
+            assert supervisor.wait(TIMEOUT) == (1 if number is signal.SIGTERM else -number)
         finally:
             watchdog.cancel()
             with contextlib.suppress(ProcessLookupError):
