@@ -51,11 +51,7 @@ def by_time(messages: Sequence[BagMessage]) -> list[BagMessage]:
 
 
 @settings(deadline=None)
-@given(
-    MESSAGES,
-    strategies.sampled_from(Preset),
-    strategies.sampled_from([0, 500]),
-)
+@given(MESSAGES, strategies.sampled_from(Preset), strategies.sampled_from([0, 500]))
 def test_every_message_comes_back(
     messages: list[BagMessage], preset: Preset, max_size: int
 ) -> None:

@@ -51,11 +51,17 @@ def settings(folder: Path, *, after: float = 0.0, window: float = 0.01) -> Black
 
 def written(box: BlackBox, before: Path | None = None) -> Path:
     """Wait for a recording that is another one than before."""
-    deadline = time.monotonic() + DEADLINE
-    while box.last == before or box.last is None:
-        assert time.monotonic() < deadline, 'no recording'
-        time.sleep(0.005)
+    until(lambda: box.last not in (None, before))
+    assert box.last is not None
     return box.last
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what a box does in its thread."""
+    deadline = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
 
 
 def test_a_fault_is_written_with_what_was_reported(tmp_path: Path) -> None:
@@ -155,10 +161,7 @@ def test_a_full_disk_is_reported_and_leaves_nothing_behind(
     box = BlackBox('bus', memory, settings(tmp_path))
     box.start()
     box.fault('joint1', 'too hot')
-    deadline = time.monotonic() + DEADLINE
-    while 'No space left on device' not in caplog.text:
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    until(lambda: 'No space left on device' in caplog.text)
     assert 'joint1: too hot' in caplog.text
     assert 'black_box_folder' in caplog.text
     assert box.last is None
@@ -216,10 +219,7 @@ def test_a_defect_in_the_contents_ends_nothing(
     box.start()
     with caplog.at_level(logging.ERROR):
         box.fault('', 'first')
-        deadline = time.monotonic() + DEADLINE
-        while 'no idea of memory.txt' not in caplog.text:
-            assert time.monotonic() < deadline
-            time.sleep(0.005)
+        until(lambda: 'no idea of memory.txt' in caplog.text)
     memory.write = Memory().write
     box.fault('', 'second')
     assert written(box).is_file()

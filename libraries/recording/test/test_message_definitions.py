@@ -8,38 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from message_definitions import (
-    concatenated,
-    DefinitionError,
-    message_definition,
-    nested_type,
-)
+from message_definitions import concatenated, DefinitionError, message_definition
 
 LINE = '=' * 80
 
 
-@pytest.mark.parametrize(
-    ('line', 'expected'),
-    [
-        ('Point[3] points', 'demo/msg/Point'),
-        ('geometry_msgs/Point point', 'geometry_msgs/msg/Point'),
-        ('builtin_interfaces/Time[<=5] stamps # many', 'builtin_interfaces/msg/Time'),
-        ('float64 x', None),
-        ('uint8 POINT=1', None),
-        ('# Point point', None),
-        ('string<=5 name', None),
-        ('', None),
-    ],
-)
-def test_types_of_fields(line: str, expected: str | None) -> None:
-    """Of the same package and others, arrays or not; never a primitive or a comment."""
-    assert nested_type(line, 'demo') == expected
-
-
 def test_definitions_are_concatenated() -> None:
-    """Each nested type once, below its name; of the same package or another."""
+    """Each nested type once, below its name; arrays or not, never a primitive or a comment."""
     texts = {
-        'a/msg/Top': 'Nested one\nb/Other[] others\nuint8 X=1 # Nested\n',
+        'a/msg/Top': 'Nested[3] some\nstring<=5 name\nb/Other[<=5] others # Many all\n'
+        'uint8 X=1 # Nested\n# Point point\n\nuint8 POINT=1\n',
         'a/msg/Nested': 'b/Other other\n',
         'b/msg/Other': 'float64 x\n',
     }

@@ -30,27 +30,21 @@ def killed(folder: Path) -> Path:
     """Write a recording that ends without its end; the last ten messages were not flushed."""
     writer = BagWriter(folder / 'open')
     add(writer, MESSAGES[:50])
-    writer.flush()
-    for each in MESSAGES[50:90]:
-        writer.write(each.topic, each.data, each.log_time, each.publish_time, each.sequence)
-    writer.flush()
-    for each in MESSAGES[90:]:
-        writer.write(each.topic, each.data, each.log_time, each.publish_time, each.sequence)
+    for part in (MESSAGES[50:90], MESSAGES[90:]):
+        writer.flush()
+        for each in part:
+            writer.write(each.topic, each.data, each.log_time, each.publish_time, each.sequence)
     return Path(shutil.copytree(folder / 'open', folder / 'bag'))
 
 
-def test_what_was_flushed_is_read(tmp_path: Path) -> None:
-    """Without metadata.yaml and without an index."""
-    reader = BagReader(killed(tmp_path))
+def test_what_was_flushed_is_read_and_can_be_finished(tmp_path: Path) -> None:
+    """Without metadata.yaml and without an index; then others read it as any other."""
+    folder = killed(tmp_path)
+    reader = BagReader(folder)
     assert not reader.finished
     assert reader.metadata.count == 90
     assert list(reader.messages()) == MESSAGES[:90]
     assert reader.metadata.topics[0].topic.qos[0].durability == 'transient_local'
-
-
-def test_it_can_be_finished(tmp_path: Path) -> None:
-    """Then others read it as any other."""
-    folder = killed(tmp_path)
     assert repair(folder).count == 90
     assert BagReader(folder).finished
     assert read_by_rosbags(folder) == plain(MESSAGES[:90])
