@@ -326,7 +326,7 @@ class Reader:
             yield 'end of the halt', target  # cyclic targets go on from where they were
 
 
-@settings(max_examples=25, phases=UNSHRUNK)
+@settings(max_examples=16, phases=UNSHRUNK)
 @given(mappings(), st.permutations(tuple(TARGETS)), st.booleans())
 @example(CIA_402_DEFAULT, list(TARGETS)[:3], False)
 def test_nothing_jumps_in_any_mapping(

@@ -167,25 +167,19 @@ class Kind:
             'recovery': self.recovery,
             'switching_state': self.switching_state,
         }
-        writes = (
-            *MOTION_WRITES,
-            *(sdo_write(*write) for write in (*limits, *options, *others)),
-        )
+        writes = MOTION_WRITES
+        writes += tuple(sdo_write(*write) for write in (*limits, *options, *others))
         drive = every_mode(
             drive_config(JOINT, NODE_ID, scales=scales, heartbeat_consumer=True, sdo_writes=writes)
         )
         seen, timer = list(drive.tpdos), CYCLE if self.transmission == ASYNCHRONOUS else None
         if not self.velocity:
             seen[1] = pdo(2, seen[1].cob_id, (0x6064, 0))
+        sent, kind = drive.rpdos[: 1 if self.by_sdo else None], self.transmission
         return replace(
             drive,
-            tpdos=tuple(
-                replace(each, transmission=self.transmission, event_time=timer) for each in seen
-            ),
-            rpdos=tuple(
-                replace(each, transmission=self.transmission)
-                for each in drive.rpdos[: 1 if self.by_sdo else None]
-            ),
+            tpdos=tuple(replace(each, transmission=kind, event_time=timer) for each in seen),
+            rpdos=tuple(replace(each, transmission=kind) for each in sent),
         )
 
 
