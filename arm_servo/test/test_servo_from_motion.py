@@ -172,6 +172,16 @@ def goal(core: MotionCore, rng: np.random.Generator, kind: str) -> TrajectoryGoa
     return TrajectoryGoal(limits.names, points)
 
 
+def refused_time_suffices(core: MotionCore) -> None:
+    """Make sure that a hasty way back is accepted with as much more time as its refusal says."""
+    here = core.state.position
+    try:
+        core.plan(goal_to(core, here, 0.02), core.basis)
+    except GoalError as error:
+        factor = float(str(error).split('give the trajectory ')[1].split(' times')[0])
+        core.plan(goal_to(core, here, 0.02 * factor), core.basis)
+
+
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('by', ['twist', 'joints'])
 @pytest.mark.parametrize('name', ROBOTS)
@@ -180,34 +190,16 @@ def goal(core: MotionCore, rng: np.random.Generator, kind: str) -> TrajectoryGoa
 def test_a_trajectory_right_after_a_jog_is_followed(
     name: str, by: str, kind: str, seed: int, duration: float
 ) -> None:
-    """At any speed of the jog, and while it speeds up."""
+    """At any speed of the jog, and while it speeds up; what is too hasty says by how much."""
     rng = np.random.default_rng(seed)
     core, states = jogged(name, rng, by, duration)
+    refused_time_suffices(core)
     wanted = goal(core, rng, kind)
     execution = core_commands.follow(core, wanted)
     states += follow_to_the_end(core, execution)[1:]
     assert ending(execution).code is GoalCode.SUCCESSFUL, ending(execution)
     assert states[-1].position == pytest.approx(wanted.points[-1].positions, abs=1e-6)
     kept(core.model.limits, states)
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-@settings(max_examples=3, deadline=None)
-@given(seed=st.integers(0, 10**6), duration=st.floats(0.3, 0.8))
-def test_a_trajectory_in_motion_is_refused_with_a_time_that_suffices(
-    name: str, seed: int, duration: float
-) -> None:
-    """Back to where the arm was takes time to turn round; as much as the refusal says."""
-    rng = np.random.default_rng(seed)
-    core, _ = jogged(name, rng, 'joints', duration)
-    here = tuple(core.state.position)
-    hasty = TrajectoryGoal(core.model.joints, [GoalPoint(0.02, here)])
-    try:
-        core.plan(hasty, core.basis)
-    except GoalError as error:
-        factor = float(str(error).split('give the trajectory ')[1].split(' times')[0])
-        later = replace(hasty.points[0], time=0.02 * factor)
-        core.plan(replace(hasty, points=[later]), core.basis)
 
 
 GANTRY = """<robot name="gantry">

@@ -26,7 +26,7 @@ from servo_commands import (
     twist,
 )
 
-from arm_model import ArmError, JointLimits
+from arm_model import JointLimits
 from arm_servo import JogRequest, PauseRequest, PoseCommand, SpeedRequest, StopRequest
 from arm_servo.controllers.controller import MOTIONS
 from arm_servo.core.requests import ImmediateRequest
@@ -124,26 +124,6 @@ def test_set_points_keep_every_limit(name: str, plan: Plan) -> None:
     for loss in losses:  # an ideal drive stands still at once when it is not commanded
         rates[max(loss - 1, 0) : loss + 1, 3] = 0.0
     assert (rates.max(axis=0) <= 1.02 * robot(name).limits.acceleration + 1e-6).all()
-
-
-@given(TWISTS)
-@settings(max_examples=10)
-def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
-    """Whatever moves the arm goes on when another command is refused."""
-    drives = Drives().following()
-    twist(drives.gateway, [0.01, *numbers[1:]], drives.now, 5.0)
-    drives.run(5)
-    source = drives.gateway.snapshot.source
-    there = [axis.setpoint + 9.0 for axis in drives.axes]
-    goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(1.0, there)])
-    refused = [
-        move_by(drives.gateway, {'panda_joint1': float('nan')}),
-        move_by(drives.gateway, {'panda_joint1': 9.0}),
-        drives.gateway.request(goal),
-    ]
-    drives.run(10)
-    assert all(isinstance(command.future.exception(), ArmError) for command in refused)
-    assert drives.gateway.snapshot.source is source
 
 
 pytestmark = pytest.mark.slow

@@ -15,12 +15,11 @@ from servo_commands import Drives, PERIOD
 from servo_nodes import GoalNode
 
 from arm_model import CommandError
-from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
-from arm_servo.controllers.controller import MOTIONS, Source
+from arm_servo import PauseRequest, SpeedRequest
+from arm_servo.controllers.controller import Source
 from arm_servo.ros import gripper as controller
 from arm_servo.ros import motion_goals
 from arm_servo.ros.gripper import GripperController, GripperParameters, PARALLEL, SINGLE
-from arm_servo.ros.trajectory import TrajectoryController
 
 pytestmark = pytest.mark.slow
 
@@ -224,20 +223,3 @@ def test_an_effort_is_warned_of_once(clock: Any, effort: bool) -> None:
     single.command.max_effort = 5.0 * effort
     parallel.command.effort = [0.0, 5.0 * effort]
     assert SINGLE.asks_effort(single) is PARALLEL.asks_effort(parallel) is effort
-
-
-def test_a_deactivated_controller_moves_no_gripper() -> None:
-    """What is under way comes to rest, and what comes next is refused."""
-    drives = Drives().following()
-    node = SimpleNamespace(get_name=lambda: 'hand_controller')
-    controller = object.__new__(TrajectoryController)
-    vars(controller).update(_node=node, _gateway=drives.gateway, active=True, _sources=MOTIONS)
-    controller.check_active()
-    command = drives.gateway.request(TargetRequest({JOINT: 1.0}, 0.1))
-    drives.run(20)
-    assert not command.ended.done()
-    controller.set_active(False)
-    drives.run(20)
-    assert command.ended.result().canceled
-    with pytest.raises(NotReadyError, match='hand_controller is inactive'):
-        controller.check_active()

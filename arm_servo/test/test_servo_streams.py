@@ -20,7 +20,14 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import JointLimits
-from arm_servo import CoreSettings, ExecutionSettings, JogRequest, JointCommand, Source
+from arm_servo import (
+    CoreSettings,
+    ExecutionSettings,
+    JogRequest,
+    JointCommand,
+    NotReadyError,
+    Source,
+)
 from arm_servo.core.gateway import TOGETHER
 from arm_servo.core.requests import by_joint
 from arm_servo.ros.trajectory import TrajectoryController
@@ -239,7 +246,18 @@ def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:
 
 
 def test_who_activates_the_controller_lets_a_stream_in(arm: Arm) -> None:
-    """A person has requested it, while none came."""
+    """A person has requested it, while none came. Deactivated it moves nothing."""
+    arm.send(1.0, 4.0)
+    arm.wait(1.0)
+    arm.controller.set_active(False)
+    arm.wait(1.0)
+    assert arm.drives.gateway.snapshot.source is Source.NONE
+    with pytest.raises(NotReadyError, match='panda_arm_controller is inactive'):
+        arm.controller.check_active()
+    rest = arm.position
+    arm.send(1.0, 4.0)
+    assert arm.position == rest < 0.6
+    arm.controller.set_active(True)
     arm.stream(10)
     halt(arm.drives)
     arm.wait(TOGETHER + 0.1)
