@@ -13,24 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 from arm_model import Array, JointLimits, RobotModel, RobotState
-from arm_servo import (
-    CoreSettings,
-    DisplacementRequest,
-    Execution,
-    JogRequest,
-    JointCommand,
-    Limiter,
-    MotionCore,
-    MotionReport,
-    Outcome,
-    PauseRequest,
-    Phase,
-    SetPoint,
-    SpeedRequest,
-    StopRequest,
-    TargetRequest,
-    TwistCommand,
-)
+import arm_servo
+from arm_servo import Execution, MotionCore
 from arm_servo.controllers.jog import Command
 from arm_servo.core.requests import by_joint
 from arm_trajectory import GoalPoint, TrajectoryGoal
@@ -43,8 +27,8 @@ class Run:
     """What came out of a run."""
 
     states: list[RobotState]  # state after every cycle, the start first
-    report: MotionReport  # the last report
-    limiters: tuple[Limiter, ...]  # of the last report that names one
+    report: arm_servo.MotionReport  # the last report
+    limiters: tuple[arm_servo.Limiter, ...]  # of the last report that names one
     moved: Array  # twist from the first pose to the last, in the base
 
 
@@ -62,12 +46,12 @@ def run(
     period: float = PERIOD,
 ) -> Run:
     """Jog by a command, or by one that changes with time, for a time [s]."""
-    states, report = [core.state], MotionReport()
-    limiters: tuple[Limiter, ...] = ()
+    states, report = [core.state], arm_servo.MotionReport()
+    limiters: tuple[arm_servo.Limiter, ...] = ()
     for step in range(round(duration / period)):
         now = step * period
         wanted = command(now) if callable(command) else command
-        core.command(JogRequest(wanted, now + TIMEOUT), now)
+        core.command(arm_servo.JogRequest(wanted, now + TIMEOUT), now)
         point = core.step(now, period)
         states.append(point.state)
         report, limiters = point.report, point.report.limiters or limiters
@@ -121,7 +105,7 @@ Event = Callable[[MotionCore, float], object]
 
 def stream(
     core: MotionCore, duration: float, events: Mapping[float, Event] | None = None
-) -> list[SetPoint]:
+) -> list[arm_servo.SetPoint]:
     """Step a core for a time [s], with events at times [s]."""
     pending = sorted((events or {}).items(), key=lambda each: each[0])
     points = []
@@ -139,7 +123,7 @@ def follow_to_the_end(
     """Step a core until a trajectory is done, and return the states."""
     states = [core.state]
     for step in range(round(longest / STREAM_PERIOD)):
-        if execution.phase is Phase.DONE:
+        if execution.phase is arm_servo.Phase.DONE:
             return states
         states.append(core.step(step * STREAM_PERIOD, STREAM_PERIOD).state)
     raise AssertionError(f'the trajectory is not done after {longest} s')
@@ -147,7 +131,7 @@ def follow_to_the_end(
 
 def core_of(
     arm: str | RobotModel,
-    settings: CoreSettings | None = None,
+    settings: arm_servo.CoreSettings | None = None,
     at: Sequence[float] | Array | None = None,
 ) -> MotionCore:
     """Return a core of an arm at rest: in its pose to start from, or where it is put."""
@@ -163,7 +147,7 @@ def goal_to(
     return TrajectoryGoal(core.model.joints, [GoalPoint(time, tuple(positions))], age=age)
 
 
-def ending(execution: Execution) -> Outcome:
+def ending(execution: Execution) -> arm_servo.Outcome:
     """Return how a trajectory has ended."""
     assert execution.ending is not None
     return execution.ending
@@ -182,16 +166,16 @@ def twist(
     duration: float = TIMEOUT,
 ) -> None:
     """Move the tool at a speed."""
-    jog = TwistCommand(np.array(numbers, dtype=np.float64), link, axes)
-    core.command(JogRequest(jog, now + duration), now)
+    jog = arm_servo.TwistCommand(np.array(numbers, dtype=np.float64), link, axes)
+    core.command(arm_servo.JogRequest(jog, now + duration), now)
 
 
 def jog(
     core: MotionCore, speeds: Mapping[str, float], now: float, duration: float = TIMEOUT
 ) -> None:
     """Move joints at speeds."""
-    jog = JointCommand(*by_joint(core.model, speeds, 'velocities'))
-    core.command(JogRequest(jog, now + duration), now)
+    jog = arm_servo.JointCommand(*by_joint(core.model, speeds, 'velocities'))
+    core.command(arm_servo.JogRequest(jog, now + duration), now)
 
 
 def follow(core: MotionCore, goal: TrajectoryGoal) -> Execution:
@@ -203,31 +187,31 @@ def follow(core: MotionCore, goal: TrajectoryGoal) -> Execution:
 
 def move_to(core: MotionCore, positions: Mapping[str, float], max_speed: float = math.inf) -> None:
     """Move joints to positions."""
-    core.command(TargetRequest(positions, max_speed))
+    core.command(arm_servo.TargetRequest(positions, max_speed))
 
 
 def move_by(
     core: MotionCore, displacements: Mapping[str, float], max_speed: float = math.inf
 ) -> None:
     """Move joints on by amounts."""
-    core.command(DisplacementRequest(displacements, max_speed))
+    core.command(arm_servo.DisplacementRequest(displacements, max_speed))
 
 
 def override(core: MotionCore, speed: float) -> None:
     """Set the speed of trajectories and targets."""
-    core.command(SpeedRequest(speed))
+    core.command(arm_servo.SpeedRequest(speed))
 
 
 def pause(core: MotionCore) -> None:
     """Come to rest until resumed."""
-    core.command(PauseRequest())
+    core.command(arm_servo.PauseRequest())
 
 
 def resume(core: MotionCore) -> None:
     """Go on."""
-    core.command(PauseRequest(is_paused=False))
+    core.command(arm_servo.PauseRequest(is_paused=False))
 
 
 def stop(core: MotionCore, reason: str = 'stopped') -> None:
     """Come to rest."""
-    core.command(StopRequest(reason))
+    core.command(arm_servo.StopRequest(reason))

@@ -17,16 +17,8 @@ import numpy as np
 
 from arm_canopen import AxisFeedback, DriveState, MotionSource, Setpoint
 from arm_model import Array, RobotModel
-from arm_servo import (
-    CoreSettings,
-    DisplacementRequest,
-    JogRequest,
-    JointCommand,
-    MotionCore,
-    Outcome,
-    SetPoint,
-    TwistCommand,
-)
+import arm_servo
+from arm_servo import MotionCore, SetPoint
 from arm_servo.core.gateway import CommandGateway, MotionCommand
 from arm_servo.core.requests import by_joint
 from arm_servo.drive_source import DriveSource
@@ -45,7 +37,7 @@ class Drives:
         worker: Executor | None = None,
         model: RobotModel | None = None,
         begin: Sequence[float] | None = None,
-        settings: CoreSettings | None = None,
+        settings: arm_servo.CoreSettings | None = None,
     ) -> None:
         self.now = 100.0
         core = MotionCore(model or robot(name), settings)
@@ -199,24 +191,24 @@ def jog(
     gateway: CommandGateway, velocities: Mapping[str, float], now: float, duration: float = 0.1
 ) -> Future[None]:
     """Jog joints."""
-    command = JointCommand(*by_joint(gateway.model, velocities, 'velocities'))
-    return gateway.command(JogRequest(command, now + duration))
+    command = arm_servo.JointCommand(*by_joint(gateway.model, velocities, 'velocities'))
+    return gateway.command(arm_servo.JogRequest(command, now + duration))
 
 
 def twist(
     gateway: CommandGateway, numbers: Sequence[float], now: float, duration: float = 0.1
 ) -> Future[None]:
     """Jog the tool."""
-    command = TwistCommand(np.array(numbers))
-    return gateway.command(JogRequest(command, now + duration))
+    command = arm_servo.TwistCommand(np.array(numbers))
+    return gateway.command(arm_servo.JogRequest(command, now + duration))
 
 
 def move_by(gateway: CommandGateway, displacements: Mapping[str, float]) -> MotionCommand:
     """Move joints on."""
-    return gateway.request(DisplacementRequest(displacements))
+    return gateway.request(arm_servo.DisplacementRequest(displacements))
 
 
-def outcome(command: MotionCommand) -> Outcome:
+def outcome(command: MotionCommand) -> arm_servo.Outcome:
     """Return how a trajectory has ended."""
     assert command.execution is not None, command.future.exception()
     return ending(command.execution)

@@ -14,18 +14,7 @@ from core_commands import ending, goal_to
 import numpy as np
 import pytest
 
-from arm_model import (
-    ArmError,
-    Array,
-    AttachedBody,
-    Box,
-    Clearances,
-    CollisionObject,
-    LeastClearance,
-    Pose,
-    RobotModel,
-    RobotState,
-)
+import arm_model
 from arm_servo import MotionCore, Outcome, SetPoint
 from arm_servo.core.safety_filter import MovingArms, SafetyFilter
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator
@@ -73,11 +62,11 @@ def texts() -> tuple[str, str]:
     )
 
 
-def model(group: str, others: Mapping[str, Sequence[str]] | None = None) -> RobotModel:
+def model(group: str, others: Mapping[str, Sequence[str]] | None = None) -> arm_model.RobotModel:
     """Return one arm, or both."""
     names = [name for arm in ARMS.values() for name in arm]
     limits = {name: {'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names}
-    return RobotModel(*texts(), limits, group, moved_by_others=others)
+    return arm_model.RobotModel(*texts(), limits, group, moved_by_others=others)
 
 
 class Pair:
@@ -109,7 +98,7 @@ class Pair:
         """Make an arm follow a trajectory."""
         core_commands.follow(self.cores[side], goal_to(self.cores[side], positions, seconds))
 
-    def at(self, side: str) -> Array:
+    def at(self, side: str) -> arm_model.Array:
         """Return where an arm is commanded to be."""
         return self.cores[side].state.position
 
@@ -203,7 +192,7 @@ def test_arms_that_are_moved_at_random_never_touch(seed: int) -> None:
             if rng.random() < 0.7:
                 pair.jog(side, inwards * rng.uniform(-0.8, 2.0), rng.uniform(-2.0, 2.0))
             else:
-                with suppress(ArmError):  # too fast from where it is
+                with suppress(arm_model.ArmError):  # too fast from where it is
                     pair.go(side, [inwards * rng.uniform(-0.2, 1.2), rng.uniform(-1, 1)], 1.5)
         for _ in range(rng.integers(1, 6)):
             pair.run(0.1)
@@ -217,12 +206,14 @@ def test_an_arm_of_which_nothing_is_known_does_not_hold_up_the_others() -> None:
     arms = [model(group) for group in ('left', 'right_1', 'right_2')]
     moving = MovingArms(arms)
     left, *others = (moving.neighbours(arm.joints) for arm in arms)
-    stop = OnlineTrajectoryGenerator(arms[0].limits).brake(RobotState.at_rest(np.array([-0.3, 0])))
+    stop = OnlineTrajectoryGenerator(arms[0].limits).brake(
+        arm_model.RobotState.at_rest(np.array([-0.3, 0]))
+    )
     assert stop is not None
     for other, place, link in zip(
         others, (0.3, 0.0), ('right_1_link', 'right_2_link'), strict=True
     ):
-        other.stands(RobotState.at_rest(np.array([place])))
+        other.stands(arm_model.RobotState.at_rest(np.array([place])))
         assert set(left.least(stop, 0.0, 1.0).links) == {'left_2_link', link}
 
 
@@ -233,7 +224,7 @@ def test_an_arm_whose_drives_others_have_counts_where_it_is(is_known: bool) -> N
     left, right = pair.cores['left'], pair.cores['right']
     pair.jog('left', -0.8, 0.0)
     for cycle in range(300):
-        place = RobotState.at_rest(np.array([0.2 + 0.001 * cycle, 0.0]))
+        place = arm_model.RobotState.at_rest(np.array([0.2 + 0.001 * cycle, 0.0]))
         right.abandon('', place if is_known else None)
         point = left.step(pair.now, PERIOD)
         pair.now += PERIOD
@@ -244,9 +235,9 @@ def test_an_arm_whose_drives_others_have_counts_where_it_is(is_known: bool) -> N
 def test_what_an_arm_holds_counts() -> None:
     """It is named, and kept from the other arm."""
     pair = Pair()
-    end = Pose(np.eye(3), np.array([0.28, 0.0, 0.0]))
-    held = CollisionObject('bar', Box(0.04, 0.3, 0.04), pose=end)
-    body = AttachedBody(held, 'left_2_link', frozenset({'left_1_link'}))
+    end = arm_model.Pose(np.eye(3), np.array([0.28, 0.0, 0.0]))
+    held = arm_model.CollisionObject('bar', arm_model.Box(0.04, 0.3, 0.04), pose=end)
+    body = arm_model.AttachedBody(held, 'left_2_link', frozenset({'left_1_link'}))
     arm = pair.cores['left'].model
     pair.moving.use_scene(arm.scene.with_allowed(arm.allowed).with_attached(body))
     pair.jog('left', -0.8, 0.0)
@@ -265,9 +256,11 @@ class NearArm:
         self.lock, self._distance = nullcontext(), distance
         self.stops = self.stands = lambda *_: None
 
-    def least(self, _stop: object, _begin: float, within: float) -> LeastClearance:
+    def least(self, _stop: object, _begin: float, within: float) -> arm_model.LeastClearance:
         """Return the distance, if it is of interest."""
-        return LeastClearance(min(self._distance, within), ('left_2_link', 'right_2_link'))
+        return arm_model.LeastClearance(
+            min(self._distance, within), ('left_2_link', 'right_2_link')
+        )
 
 
 @pytest.mark.parametrize(('distance', 'passes'), [(1.0, True), (0.05, False)])
@@ -276,15 +269,17 @@ def test_near_another_arm_a_path_is_left_only_where_that_is_clear(
 ) -> None:
     """A path may bend around a box; a stop for the other arm goes straight on, into it."""
     arm = model('left')
-    pose = Pose(np.eye(3), np.array([0.0, 0.85, 0.0]))
-    box = CollisionObject('box', Box(0.1, 0.1, 0.1), pose=pose)
-    arm.use_scene(Clearances(arm.scene.with_object(box)))
+    pose = arm_model.Pose(np.eye(3), np.array([0.0, 0.85, 0.0]))
+    box = arm_model.CollisionObject('box', arm_model.Box(0.1, 0.1, 0.1), pose=pose)
+    arm.use_scene(arm_model.Clearances(arm.scene.with_object(box)))
     safety = SafetyFilter(arm, OnlineTrajectoryGenerator(arm.limits))
     safety.keep_apart(NearArm(distance))  # type: ignore[arg-type]
     at, speed = np.array([1.3, 0.0]), np.array([1.5, 0.0])
     assert arm.clearance(at) > 0.01
-    state = RobotState(at, 0.3 * speed, np.zeros(2))  # its stop is clear, that behind a step not
-    safety.reset(RobotState.at_rest(at))
-    wanted = RobotState(at + speed * PERIOD, speed, np.zeros(2))
+    state = arm_model.RobotState(
+        at, 0.3 * speed, np.zeros(2)
+    )  # its stop is clear, that behind a step not
+    safety.reset(arm_model.RobotState.at_rest(at))
+    wanted = arm_model.RobotState(at + speed * PERIOD, speed, np.zeros(2))
     after, limiter = safety.step(state, wanted, PERIOD, None, apart=CLEARANCE)
     assert (after is wanted) is (limiter is None) is passes

@@ -11,16 +11,7 @@ import numpy as np
 import pytest
 from servo_commands import Drives, jog, move_by, PERIOD, SteppedWorker
 
-from arm_model import (
-    Array,
-    Box,
-    Clearances,
-    CollisionObject,
-    CommandError,
-    PlanningScene,
-    RobotModel,
-    SceneError,
-)
+import arm_model
 from arm_servo import Source
 from arm_servo.core.gateway import MAX_ATTEMPTS, MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
@@ -32,17 +23,21 @@ JOINT = 'panda_joint1'
 
 def started(worker: Executor | None = None) -> Drives:
     """Return drives of an arm of its own that follow."""
-    return Drives(worker=worker, model=RobotModel(*texts('panda'), table('panda'))).following()
+    return Drives(
+        worker=worker, model=arm_model.RobotModel(*texts('panda'), table('panda'))
+    ).following()
 
 
-def box(turned: float, name: str = 'box') -> CollisionObject:
+def box(turned: float, name: str = 'box') -> arm_model.CollisionObject:
     """Return a box where the hand would be with the first joint turned."""
     at = ready('panda').copy()
     at[0] += turned
-    return CollisionObject(name, Box(0.1, 0.1, 0.1), pose=robot('panda').pose(at, 'panda_hand'))
+    return arm_model.CollisionObject(
+        name, arm_model.Box(0.1, 0.1, 0.1), pose=robot('panda').pose(at, 'panda_hand')
+    )
 
 
-def use(drives: Drives, *things: CollisionObject) -> PlanningScene:
+def use(drives: Drives, *things: arm_model.CollisionObject) -> arm_model.PlanningScene:
     """Use a scene with some objects at once."""
     scene = use_later(drives, *things)
     drives.run()
@@ -50,7 +45,7 @@ def use(drives: Drives, *things: CollisionObject) -> PlanningScene:
     return scene
 
 
-def use_later(drives: Drives, *things: CollisionObject) -> PlanningScene:
+def use_later(drives: Drives, *things: arm_model.CollisionObject) -> arm_model.PlanningScene:
     """Use a scene with some objects from the next cycle on."""
     scene = drives.gateway.model.scene.with_contents(
         objects={thing.name: thing for thing in things}, attached_bodies={}
@@ -81,10 +76,10 @@ def under_way(drives: Drives, cycles: int) -> MotionCommand:
     return command
 
 
-def least(scene: PlanningScene, path: list[Array]) -> float:
+def least(scene: arm_model.PlanningScene, path: list[arm_model.Array]) -> float:
     """Return the least distance on a path."""
-    model = RobotModel(*texts('panda'), table('panda'))
-    model.use_scene(Clearances(scene))
+    model = arm_model.RobotModel(*texts('panda'), table('panda'))
+    model.use_scene(arm_model.Clearances(scene))
     return min(model.clearance(positions, 0.2) for positions in path)
 
 
@@ -166,7 +161,7 @@ def test_what_was_prepared_in_an_old_scene_is_prepared_again(is_blocked: bool) -
         worker.run()
         drives.run()
     if is_blocked:
-        with pytest.raises(CommandError, match='box would collide'):
+        with pytest.raises(arm_model.CommandError, match='box would collide'):
             command.future.result(0.0)
         assert drives.path[-1].tolist() == ready('panda').tolist()
     else:
@@ -215,7 +210,7 @@ def test_a_grasp_that_the_planner_allowed_passes(is_allowed: bool) -> None:
     command = move_by(drives.gateway, {JOINT: 0.8})
     drives.run(300)
     if not is_allowed:
-        with pytest.raises(CommandError, match='box would collide'):
+        with pytest.raises(arm_model.CommandError, match='box would collide'):
             command.future.result(0.0)
         return
     assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
@@ -226,7 +221,7 @@ def test_a_grasp_that_the_planner_allowed_passes(is_allowed: bool) -> None:
     against = move_by(drives.gateway, {JOINT: -0.8})
     drives.run(300)
     assert back.ended.result(0.0).code is GoalCode.SUCCESSFUL
-    with pytest.raises(CommandError, match='post would collide'):
+    with pytest.raises(arm_model.CommandError, match='post would collide'):
         against.future.result(0.0)
 
 
@@ -234,7 +229,7 @@ def test_the_scene_of_another_arm_is_refused() -> None:
     """And the one before goes on to count."""
     drives = started()
     before = drives.gateway.model.scene
-    with pytest.raises(SceneError, match='not that of panda_arm'):
+    with pytest.raises(arm_model.SceneError, match='not that of panda_arm'):
         drives.gateway.use_scene(robot('prbt').scene)
     drives.run()
     assert drives.gateway.model.scene is before
