@@ -192,6 +192,9 @@ def test_circ_stays_on_its_arc(name: str, seed: int, center: bool) -> None:
         assert arc.at(share).position == pytest.approx(on_circle(share * sweep), abs=1e-6)
         before, after = (arc.at(share + shift).position for shift in (-1e-6, 1e-6))
         assert arc.twist(share)[:3] == pytest.approx((after - before) / 2e-6, abs=1e-6)
+    wide = arc_through(begin, on_circle(2.0), Pose(begin.rotation, on_circle(5.0)))
+    assert wide.length == pytest.approx(5.0 * radius)
+    assert wide.nearest(on_circle(4.0)) == pytest.approx(0.8)
     found = planned(name, request(name, 'CIRC', goal, via=via))
     assume(found is not None)
     assert found is not None

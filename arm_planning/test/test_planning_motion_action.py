@@ -28,6 +28,16 @@ from node_runner import action_goals
 
 TIMEOUT = 20.0  # [s]
 
+Action = tuple[Any, str]  # type and name
+MOTION: Action = (MoveGroup, 'move_action')
+SEQUENCE: Action = (MoveGroupSequence, 'sequence_move_group')
+TRAJECTORY: Action = (ExecuteTrajectory, 'execute_trajectory')
+
+
+def code_of(result: Any) -> Any:
+    """Return the code of a result of any action."""
+    return getattr(result, 'response', result).error_code
+
 
 class Bench:
     """Both actions and their clients in one node."""
@@ -166,17 +176,6 @@ def test_a_refusal_of_the_second_plan_says_why_the_first_has_ended(bench: Bench)
     code = code_of(bench.result(handle)[1])
     words = 'the goal is covered; the arm was stopped on its way: a box has come'
     assert (code.val, code.message) == (PlanningCode.GOAL_IN_COLLISION, words)
-
-
-Action = tuple[Any, str]  # type and name
-MOTION: Action = (MoveGroup, 'move_action')
-SEQUENCE: Action = (MoveGroupSequence, 'sequence_move_group')
-TRAJECTORY: Action = (ExecuteTrajectory, 'execute_trajectory')
-
-
-def code_of(result: Any) -> Any:
-    """Return the code of a result of any action."""
-    return getattr(result, 'response', result).error_code
 
 
 @pytest.mark.parametrize('action', [MOTION, SEQUENCE], ids=['motion', 'sequence'])
