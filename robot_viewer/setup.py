@@ -13,6 +13,7 @@ runpy.run_path(str(SHARED))['setup_package'](
             'python3-trimesh-pip',
             'python3-viser-pip',
             'python3-websockets',
+            'python3-zstandard',
         ],
     },
     programs=[
