@@ -40,6 +40,20 @@ def test_a_second_interrupt_is_not_kept() -> None:
     assert not done
 
 
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_is_ignored_is_an_interrupt_while_a_command_runs(
+    number: signal.Signals,
+) -> None:
+    """A background job of a script has SIGINT ignored, and still ends."""
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with pytest.raises(KeyboardInterrupt), signals_interrupt():
+            os.kill(os.getpid(), number)
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
+
+
 def test_threads_can_use_the_blocks() -> None:
     """Only the main thread may set handlers; others just run."""
     done = []
