@@ -75,6 +75,8 @@ def test_rosbags_reads_it(tmp_path: Path, preset: Preset) -> None:
     options = WriterOptions(max_duration=SECOND, preset=preset)
     write(tmp_path / 'bag', messages, options)
     assert read_by_rosbags(tmp_path / 'bag') == plain(messages)
+    topics = BagReader(tmp_path / 'bag').metadata.topics  # definitions are in the files alone
+    assert {each.topic.definition for each in topics} == {TEXT.definition, COUNT.definition}
     with Reader(tmp_path / 'bag') as reader:
         assert reader.message_count == 200
         assert reader.start_time == EPOCH
@@ -192,13 +194,6 @@ def test_files_of_other_writers(options: dict[str, Any], tmp_path: Path) -> None
     assert list(BagReader(path).messages()) == [message(number) for number in range(20)]
     with path.open('rb') as stream:
         assert has_index(stream) == (not options)
-
-
-def test_definitions_of_a_finished_recording(tmp_path: Path) -> None:
-    """metadata.yaml has none; the files have."""
-    write(tmp_path / 'bag', [message(0)])
-    topics = BagReader(tmp_path / 'bag').metadata.topics
-    assert {each.topic.definition for each in topics} == {TEXT.definition, COUNT.definition}
 
 
 def test_an_existing_folder_is_not_touched(tmp_path: Path) -> None:

@@ -27,19 +27,10 @@ def in_process(code: str) -> str:
     ).stdout.strip()
 
 
-def may_have_priority() -> bool:
-    """Whether this user may have a real-time priority."""
-    return (
-        in_process(
-            'from realtime_loop import raise_priority; print(raise_priority(1, "x").granted)'
-        )
-        == 'True'
-    )
-
-
 def test_the_kernel_has_the_priority_that_was_granted_for_that_thread_alone() -> None:
     """Other threads, and those that the thread starts, stay as they were."""
-    if not may_have_priority():
+    ask = 'from realtime_loop import raise_priority; print(raise_priority(1, "x").granted)'
+    if in_process(ask) != 'True':
         pytest.skip('no real-time priority for this user')
     seen: dict[str, int] = {}
 
