@@ -248,6 +248,14 @@ def twice() -> msg.PlanningScene:
     return scene
 
 
+def padded(link: str, padding: float) -> msg.PlanningScene:
+    """Return a change of the padding of a link."""
+    return change(link_padding=[msg.LinkPadding(link_name=link, padding=padding)])
+
+
+LONG = PoseMessage(orientation=Quaternion(w=2.0))
+FLAT = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1])
+ROWLESS = msg.AllowedCollisionMatrix(entry_names=['a', 'b'])
 NO_OBJECT, NO_LINK, OTHER = CODE.INVALID_OBJECT_NAME, CODE.INVALID_LINK_NAME, CODE.FAILURE
 SCENES: dict[str, tuple[msg.PlanningScene, PlanningCode, str]] = {
     'empty mesh': (crate(meshes=[MeshMessage()]), OTHER, "'crate': .*no volume"),
@@ -259,12 +267,8 @@ SCENES: dict[str, tuple[msg.PlanningScene, PlanningCode, str]] = {
     'half a subframe': (crate(subframe_names=['tip']), OTHER, 'subframes'),
     'unknown operation': (crate(operation=b'\x07'), OTHER, 'operation 7'),
     'unknown frame': (crate(header=Header(frame_id='x')), CODE.FRAME_TRANSFORM_FAILURE, "'x'"),
-    'no unit quaternion': (
-        crate(pose=PoseMessage(orientation=Quaternion(w=2.0))), OTHER, 'length is 2'
-    ),
-    'box of two edges': (
-        crate(primitives=[SolidPrimitive(type=1, dimensions=[0.1, 0.1])]), OTHER, '3 dimensions'
-    ),
+    'no unit quaternion': (crate(pose=LONG), OTHER, 'length is 2'),
+    'box of two edges': (crate(primitives=[FLAT]), OTHER, '3 dimensions'),
     'unknown primitive': (crate(primitives=[SolidPrimitive(type=9)]), OTHER, 'no primitive 9'),
     'two poses of a box': (crate(primitive_poses=[pose_at(0.0)] * 2), OTHER, '1 primitive shapes'),
     'no name': (crate(id=''), NO_OBJECT, 'name'),
@@ -276,20 +280,10 @@ SCENES: dict[str, tuple[msg.PlanningScene, PlanningCode, str]] = {
     'attached to an unknown link': (attached('claw'), NO_LINK, "'claw'"),
     'touching an unknown link': (attached(HAND, 'claw'), NO_LINK, "'claw'"),
     'attached and in the world': (twice(), NO_OBJECT, 'attached to panda_link8'),
-    'padding of an unknown link': (
-        change(link_padding=[msg.LinkPadding(link_name='claw')]), NO_LINK, "'claw'"
-    ),
-    'negative padding': (
-        change(link_padding=[msg.LinkPadding(link_name=HAND, padding=-0.1)]), OTHER, '-0.1'
-    ),
-    'scale of zero': (
-        change(link_scale=[msg.LinkScale(link_name=HAND, scale=0.0)]), OTHER, 'scale'
-    ),
-    'matrix without rows': (
-        change(allowed_collision_matrix=msg.AllowedCollisionMatrix(entry_names=['a', 'b'])),
-        OTHER,
-        'entry_values',
-    ),
+    'padding of an unknown link': (padded('claw', 0.1), NO_LINK, "'claw'"),
+    'negative padding': (padded(HAND, -0.1), OTHER, '-0.1'),
+    'scale of zero': (change(link_scale=[msg.LinkScale(link_name=HAND)]), OTHER, 'scale'),
+    'matrix without rows': (change(allowed_collision_matrix=ROWLESS), OTHER, 'entry_values'),
 }  # fmt: skip
 
 
