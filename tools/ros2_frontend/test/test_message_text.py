@@ -20,21 +20,6 @@ import yaml
 from ros2_frontend.messages.fill import Abbreviation, to_csv, to_document, to_yaml
 from ros2_frontend.names import Message
 
-JOINTS = """\
-header:
-  stamp:
-    sec: 0
-    nanosec: 0
-  frame_id: base
-name:
-- one
-- two
-position:
-- 0.5
-- -1.0
-velocity: []
-effort: []
-"""
 FIELDS = st.from_regex(r'[a-z][a-z0-9_]{0,5}', fullmatch=True) | st.sampled_from(['y', 'on', 'no'])
 TEXTS = st.text(max_size=12) | st.sampled_from(
     ['', ' ', 'No', '1', '1e3', '1:30', '~', '- a', '/tf']
@@ -79,7 +64,6 @@ def joints() -> JointState:
 @pytest.mark.parametrize(
     ('message', 'text'),
     [
-        (joints(), JOINTS),
         (Vector3(z=0.5), 'x: 0.0\ny: 0.0\nz: 0.5\n'),
         (Polygon(points=[Point32(x=1.0)]), 'points:\n- x: 1.0\n  y: 0.0\n  z: 0.0\n'),
         (Byte(data=b'A'), 'data: A\n'),  # the text of the same code point, as rosidl_runtime_py

@@ -153,14 +153,6 @@ def test_pub_says_when_qos_does_not_fit(zoo: Mapping[str, str]) -> None:
         assert process.stop() == 2
 
 
-def test_pub_until_interrupted(zoo: Mapping[str, str]) -> None:
-    """Without a count it goes on at its rate; Ctrl-C ends it."""
-    words = [*PROGRAM, 'topic', 'pub', '-r', '50', '/nobody', 'std_msgs/msg/String', 'data: x']
-    with RunningProcess(words, zoo) as process:
-        process.wait_for(r"^publishing #5: std_msgs.msg.String\(data='x'\)$")
-        assert process.stop() == 2
-
-
 @pytest.mark.parametrize(
     ('words', 'problem'),
     [
