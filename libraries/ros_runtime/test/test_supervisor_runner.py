@@ -58,18 +58,13 @@ def nothing(_: Runner) -> None:
     """Do nothing."""
 
 
-def test_each_process_has_a_session_of_its_own() -> None:
-    """So Ctrl-C in the terminal reaches the supervisor only."""
+def test_ctrl_c_in_the_terminal_reaches_the_supervisor_only() -> None:
+    """Each process has a session of its own; afterwards Ctrl-C means what it meant before."""
+    before = [signal.getsignal(number) for number in LEAVE_SIGNALS]
     watch = Watch(program('good', notifies_ready=True), when_ready=ctrl_c)
     watch.run()
     _, pid, session = watch.said('good')[0].split()
     assert pid == session != str(os.getsid(0))
-
-
-def test_signal_handlers_are_given_back() -> None:
-    """After a bring-up, Ctrl-C means what it meant before."""
-    before = [signal.getsignal(number) for number in LEAVE_SIGNALS]
-    Watch(program('good', notifies_ready=True), when_ready=ctrl_c).run()
     assert [signal.getsignal(number) for number in LEAVE_SIGNALS] == before
     assert signal.set_wakeup_fd(-1) == -1
 
