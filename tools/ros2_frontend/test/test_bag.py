@@ -25,7 +25,6 @@ from rosbag_files.reader import recording_files, scan
 pytestmark = pytest.mark.scenario
 
 SOURCE = Path(__file__).with_name('frontend_source.py')
-RECORDING = 'Recording...'
 TIMEOUT = 30.0  # [s]
 
 
@@ -37,9 +36,13 @@ def env(monkeypatch: pytest.MonkeyPatch) -> Iterator[Mapping[str, str]]:
         yield with_frontend(isolation.env)
 
 
-def record(env: Mapping[str, str], folder: Path, *words: str) -> RunningProcess:
-    """Start `ros2 bag record`."""
-    return RunningProcess([*PROGRAM, 'bag', 'record', '-o', str(folder), *words], env)
+@contextlib.contextmanager
+def record(env: Mapping[str, str], folder: Path, *words: str) -> Iterator[RunningProcess]:
+    """Run `ros2 bag record`, which has begun."""
+    command = [*PROGRAM, 'bag', 'record', '-o', str(folder), *words]
+    with RunningProcess(command, env) as recorder:
+        recorder.wait_for('Recording...')
+        yield recorder
 
 
 def source(env: Mapping[str, str], count: int, period: float = 0.001) -> RunningProcess:
@@ -78,11 +81,9 @@ def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> No
     """Of topics that appear later, and what a latched one kept; in several compressed files."""
     folder = tmp_path / 'bag'
     words = ['-a', '--max-bag-size', '20000', '--storage-preset-profile', 'zstd_fast']
-    with record(env, folder, *words) as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 3000) as publisher:
-            publisher.wait_for('published')
-            assert recorder.stop() == 0
+    with record(env, folder, *words) as recorder, source(env, 3000) as publisher:
+        publisher.wait_for('published')
+        assert recorder.stop() == 0
     found = read(folder)
     assert found['/numbers'] == list(range(3000))
     assert found['/loose'] == list(range(3000))
@@ -94,12 +95,11 @@ def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> No
 
 def test_a_signal_ends_it_with_a_whole_recording(env: Mapping[str, str], tmp_path: Path) -> None:
     """While messages arrive: SIGTERM as Ctrl-C, which ends those of the other tests."""
-    with record(env, tmp_path / 'bag', '--topics', '/numbers', '/loose') as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 100_000) as publisher:
-            publisher.wait_for('connected')
-            recorder.signal(signal.SIGTERM)
-            assert recorder.wait() == 0
+    topics = ['--topics', '/numbers', '/loose']
+    with record(env, tmp_path / 'bag', *topics) as recorder, source(env, 100_000) as publisher:
+        publisher.wait_for('connected')
+        recorder.signal(signal.SIGTERM)
+        assert recorder.wait() == 0
     numbers = read(tmp_path / 'bag').get('/numbers', [])
     assert numbers == list(range(len(numbers)))
 
@@ -109,14 +109,12 @@ def test_after_a_kill_all_but_the_last_second_is_there(
 ) -> None:
     """`info` and `play` read it as it is, `reindex` finishes it for others."""
     folder = tmp_path / 'bag'
-    with record(env, folder, '-a') as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 1000) as publisher:
-            publisher.wait_for('published')
-            file = folder / 'bag_0.mcap'
-            until(lambda: b'/numbers' in file.read_bytes(), recorder)
-            recorder.signal(signal.SIGKILL)
-            recorder.wait()
+    with record(env, folder, '-a') as recorder, source(env, 1000) as publisher:
+        publisher.wait_for('published')
+        file = folder / 'bag_0.mcap'
+        until(lambda: b'/numbers' in file.read_bytes(), recorder)
+        recorder.signal(signal.SIGKILL)
+        recorder.wait()
     outcome = ros2('bag', 'info', str(folder))
     assert outcome.code == 0
     assert 'Topic: /numbers | Type: std_msgs/msg/UInt32 | Count: ' in outcome.out
@@ -131,14 +129,12 @@ def test_after_a_kill_all_but_the_last_second_is_there(
 def test_what_is_recorded_is_played(env: Mapping[str, str], tmp_path: Path) -> None:
     """Recording what is played gives what was recorded: bytes, order, QoS; under another name."""
     first, second = tmp_path / 'first', tmp_path / 'second'
-    with record(env, first, '-a', '-x', 'rosout|parameter') as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 300) as publisher:
-            publisher.wait_for('published')
-            recorder.stop()
+    words = ['-a', '-x', 'rosout|parameter']
+    with record(env, first, *words) as recorder, source(env, 300) as publisher:
+        publisher.wait_for('published')
+        recorder.stop()
     topics = ['--topics', '/counted', '/loose', '/latched']
     with record(env, second, *topics) as recorder:
-        recorder.wait_for(RECORDING)
         words = ['bag', 'play', str(first), '--remap', '/numbers:=/counted', '--delay', '2']
         with RunningProcess([*PROGRAM, *words, '-r', '0.2'], env) as player:
             # one that stands still at the end misses nothing: the player waits for it
@@ -166,13 +162,11 @@ def test_play_chooses_a_part_and_a_rate(
 ) -> None:
     """From an offset on, of one topic, a thousand times faster; in a loop until it is ended."""
     first, second = tmp_path / 'first', tmp_path / 'second'
-    with record(env, first, '-e', 'numbers|loose') as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 100, 0.02) as publisher:
-            publisher.wait_for('published')
-            recorder.stop()
+    words = ['-e', 'numbers|loose']
+    with record(env, first, *words) as recorder, source(env, 100, 0.02) as publisher:
+        publisher.wait_for('published')
+        recorder.stop()
     with record(env, second, '--topics', '/numbers', '/clock') as recorder:
-        recorder.wait_for(RECORDING)
         words = ['bag', 'play', str(first), '--topics', '/numbers', '--start-offset', '1']
         words += ['-r', '1000', '-l', '--delay', '1', '--clock', '100']
         with RunningProcess([*PROGRAM, *words], env) as player:
@@ -199,18 +193,16 @@ def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_pat
     overrides.write_text('/numbers: {history: keep_last, depth: 100}\n')
     folder = tmp_path / 'bag'
     words = ['--topics', '/numbers', '/loose', '--qos-profile-overrides-path', str(overrides)]
-    with record(env, folder, *words) as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 1000) as publisher:
-            publisher.wait_for('published')
-            file = folder / 'bag_0.mcap'
-            until(lambda: b'/numbers' in file.read_bytes(), recorder)
-            recorder.signal(signal.SIGSTOP)
-            publisher.signal(signal.SIGUSR1)
-            publisher.wait_for('published', count=2)
-            recorder.signal(signal.SIGCONT)
-            until(lambda: arrived(folder, '/numbers') > 1000, recorder)
-            recorder.stop()
+    with record(env, folder, *words) as recorder, source(env, 1000) as publisher:
+        publisher.wait_for('published')
+        file = folder / 'bag_0.mcap'
+        until(lambda: b'/numbers' in file.read_bytes(), recorder)
+        recorder.signal(signal.SIGSTOP)
+        publisher.signal(signal.SIGUSR1)
+        publisher.wait_for('published', count=2)
+        recorder.signal(signal.SIGCONT)
+        until(lambda: arrived(folder, '/numbers') > 1000, recorder)
+        recorder.stop()
     numbers = read(folder)['/numbers']
     # what came before the first one that arrived, and after the last one, is no gap
     first, last = int(str(numbers[0])), int(str(numbers[-1]))

@@ -44,7 +44,7 @@ def test_environment_findings(
 @pytest.mark.scenario
 @pytest.mark.usefixtures('zoo')
 def test_doctor_over_dds(ros2: Ros2) -> None:
-    """Warnings alone fail no check, unless they are to."""
+    """Warnings alone fail no check, unless they are to; a report has all tables."""
     outcome = ros2('doctor')
     assert outcome.code == 0
     assert outcome.out == '\nAll 3 checks passed\n\n'
@@ -52,12 +52,6 @@ def test_doctor_over_dds(ros2: Ros2) -> None:
     assert sentence in outcome.err
     strict = ros2('wtf', '--include-warnings')
     assert 'check(s) failed\n\nFailed modules: ' in strict.out
-
-
-@pytest.mark.scenario
-@pytest.mark.usefixtures('zoo')
-def test_doctor_report(ros2: Ros2) -> None:
-    """All tables; the QoS of a pair that does not connect is reported."""
     out = ros2('doctor', '--report').out
     heads = [line.strip() for line in out.splitlines() if line.startswith('   ')]
     assert heads == [
