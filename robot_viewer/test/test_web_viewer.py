@@ -286,6 +286,7 @@ def test_a_stop_of_somebody_else_leaves_no_drive_moving(
     with conveyor(isolation, kind) as asked:
         robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
         robot.spin_until(lambda: robot.node.count_services('/stop') == 1, 'its server')
+        robot.spin_until(lambda: 'conveyor' in robot.viewer.get_node_names(), 'its node')
         robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
         client = robot.viewer._triggers.client('/stop')
         robot.spin_until(lambda: client.service_is_ready() or not is_asked, 'a connection')
