@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from isolation import Isolation
 import pytest
 from rclpy.context import Context
 from rclpy.node import Node
@@ -155,6 +156,23 @@ def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> Non
     assert 'viewer' not in processes(tmp_path, replace(plain, view=True))
     orders = {name: spec.stop_order for name, spec in without.items()}
     assert orders['master'] < orders['robot_state'] < orders['slaves']
+
+
+def test_a_second_simulated_arm_has_a_bus_of_its_own(
+    isolation: Isolation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a choice of the bus; one that is chosen is not shared."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(isolation.domain_id))
+    with (
+        session.own_bus(None, simulate=True) as one,
+        session.own_bus(None, simulate=True) as other,
+    ):
+        assert one != other
+        with (
+            pytest.raises(StartError, match='another bring-up'),
+            session.own_bus(one, simulate=True),
+        ):
+            pytest.fail(f'{one} is shared')
 
 
 @pytest.mark.parametrize('packages', [['robot_viewer'], ['robot_viewer', 'robot_state_publisher']])

@@ -290,7 +290,7 @@ SCENES: dict[str, tuple[msg.PlanningScene, PlanningCode, str]] = {
 @pytest.mark.parametrize('name', SCENES)
 def test_a_bad_scene_is_refused_as_a_whole(rig: MoveGroupRig, name: str) -> None:
     """By apply_planning_scene with words in the log, and as the diff of a goal with its code."""
-    wrong, code, words = SCENES[name]
+    wrong, code, words = deepcopy(SCENES[name])
     good = box('good', 2.0, 0.0, 0.5)
     wrong.world.collision_objects = [good, *wrong.world.collision_objects]
     assert not rig.apply(wrong)

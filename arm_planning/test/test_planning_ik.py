@@ -92,7 +92,9 @@ def test_only_arms_with_a_spherical_wrist_have_a_closed_form() -> None:
         assert IkSolver(chain(kinds)).closed_form is None
     model, here = robot('gp110'), ready('gp110')
     joint_of = {each: model.kinematics.parent_joint(each) for each in model.frames}
-    for name in [each for each, joint in joint_of.items() if joint == 6]:
+    behind = [each for each, joint in joint_of.items() if joint == 6]
+    assert model.tip in behind
+    for name in behind:
         inverse = IkSolver(model, name)
         assert inverse.closed_form is not None
         pose = model.kinematics.link_pose(name, here)

@@ -280,9 +280,12 @@ def test_a_stop_is_never_overtaken(
     halted: list[str],
 ) -> None:
     """Whatever was commanded before it does not move the arm after it, also back again."""
-    assume(stop not in {pause_servo, pause_briefly} or kind in JOGS)
+    if stop in {pause_servo, pause_briefly} and kind not in JOGS:
+        kind = 'displacement'  # trajectories go on after these stops
+    if stop is pause_briefly:  # before two steps are over no displacement has begun
+        steps, later = steps[:2], 0
     arm = Bench(at_topics=stop is end)
-    begun = arm.begin(kind, steps, 0 if stop is pause_briefly else later)
+    begun = arm.begin(kind, steps, later)
     assume(stop is not pause_briefly or begun.is_idle)
     stop(arm, halted)
     arm.only_brakes(begun)

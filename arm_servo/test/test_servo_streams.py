@@ -202,6 +202,18 @@ def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
     assert arm.position > rest + MOVED
 
 
+def test_a_stream_moves_no_arm_that_is_enabled(arm: Arm) -> None:
+    """It began while the drives were disabled; they were enabled for something else."""
+    enabled, refusal = list(arm.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    arm.drives.axes = [replace(axis, followable=False, refusal=refusal) for axis in enabled]
+    arm.wait(0.1)
+    arm.stream(5)
+    arm.drives.axes = enabled
+    rest = arm.position
+    arm.stream()
+    assert arm.position == pytest.approx(rest, abs=1e-6)
+
+
 def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
     """Its first trajectory is a request; those that follow are not ended by it."""
     halt(arm.drives)
