@@ -262,9 +262,11 @@ def state_is(page: Page, word: str) -> None:
 def see_fault(page: Page, reason: str, action: str) -> None:
     """Check that a fault is seen in each group at each size, and that nothing can be moved."""
     state, button = page.locator('#rv-state'), page.locator('#rv-do')
+    groups = page.locator('[role=tab]').all_inner_texts()[:GROUPS]
+    assert len(groups) == GROUPS, groups
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({'width': width, 'height': height})
-        for group in page.locator('[role=tab]').all_inner_texts()[:GROUPS]:
+        for group in groups:
             show(page, group)
             where = size, group
             assert re.match(f'FAULT.*{reason}', state.inner_text(), re.DOTALL), where

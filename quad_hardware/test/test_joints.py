@@ -23,6 +23,7 @@ from quad_hardware.joints import (
     JointServo,
     LimiterSettings,
     MAX_PERIOD,
+    NOMINAL_PERIOD,
     servo_of,
 )
 from quad_hardware.link.dialects import V1Dialect, V2Dialect
@@ -49,12 +50,13 @@ def test_no_target_jumps_or_goes_farther_beyond_its_limits(
     """
     limiter = CommandLimiter(JOINTS, settings)
     last, now = measured, 0.0
-    for wanted, pause in stream:
+    for index, (wanted, pause) in enumerate(stream):
         now += pause
+        elapsed = min(pause, MAX_PERIOD) if index else NOMINAL_PERIOD
         command = limiter.step(wanted, last, now)
         targets = list(command.targets)
         steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
-        assert max(steps) <= settings.max_joint_speed * MAX_PERIOD + 1e-9
+        assert max(steps) <= settings.max_joint_speed * elapsed + 1e-9
         rows = zip(JOINTS.servos, wanted, last, targets, strict=True)
         for servo, asked, before, target in rows:
             low, high = min(servo.lower, before), max(servo.upper, before)
@@ -204,28 +206,33 @@ def test_every_joint_of_the_robot_has_its_motor() -> None:
     assert [gripper.angle(p) for p in (0.0, 0.02)] == pytest.approx([-65.0, 65.0])
     angles = dict.fromkeys(LEG_MOTORS, 90.0)
     assert ARM_JOINTS.positions(angles) == dict.fromkeys(names[:12], pytest.approx(math.pi / 2))
+    assert servo_of(KNEE, 11).lower == LEGS[2].limits.lower, 'of another name'
+    assert JointMap([*reversed(SERVOS[:12]), *SERVOS[12:]]).leg_count == 12
 
 
-def test_joints_that_are_no_quadruped_are_refused_by_name() -> None:
-    """Before a port is opened. The legs come first: twelve positions are theirs."""
-    servos = [servo_of(joint) for joint in ARM]
-    knee = replace(LEGS[2], name='front_left_knee')
-    tail = replace(LEGS[2], name='tail_joint')
-    refusals: list[tuple[Callable[[], object], str]] = [
-        (lambda: JointMap(s for s in servos if s.joint != 'bl_calf_joint'),
+SERVOS = [servo_of(joint) for joint in ARM]
+KNEE, TAIL = (replace(LEGS[2], name=name) for name in ('front_left_knee', 'tail_joint'))
+
+
+@pytest.mark.parametrize(
+    ('refused', 'reason'),
+    [
+        (lambda: JointMap(s for s in SERVOS if s.joint != 'bl_calf_joint'),
          'no joint for motors 41; .* bl_calf_joint; correct robot_description'),
-        (lambda: servo_of(knee), r'front_left_knee.*joints\.front_left_knee\.motor'),
-        (lambda: JointMap([*servos, servo_of(knee, 11)]), 'motor 11 moves two joints'),
-        (lambda: JointMap([servos[12], *servos[:12], *servos[13:]]),
+        (lambda: servo_of(KNEE), r'front_left_knee.*joints\.front_left_knee\.motor'),
+        (lambda: JointMap([*SERVOS, servo_of(KNEE, 11)]), 'motor 11 moves two joints'),
+        (lambda: JointMap([SERVOS[12], *SERVOS[:12], *SERVOS[13:]]),
          'has arm_yaw_joint before joints of the legs'),
-        (lambda: JointMap([*servos, servo_of(tail, 61)]),
+        (lambda: JointMap([*SERVOS, servo_of(TAIL, 61)]),
          r'tail_joint: unknown motor 61; give joints\.tail_joint\.motor'),
-    ]  # fmt: skip
-    for refused, reason in refusals:
-        with pytest.raises(CommandError, match=reason):
-            refused()
-    assert servo_of(knee, 11).lower == LEGS[2].limits.lower
-    assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
+    ],
+)  # fmt: skip
+def test_joints_that_are_no_quadruped_are_refused_by_name(
+    refused: Callable[[], object], reason: str
+) -> None:
+    """Before a port is opened. The legs come first: twelve positions are theirs."""
+    with pytest.raises(CommandError, match=reason):
+        refused()
 
 
 @given(
@@ -251,14 +258,18 @@ def test_every_target_fits_into_a_frame(
                 dialect.command(angles)
 
 
-def test_settings_that_move_a_servo_wrongly_are_refused() -> None:
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        ({'sign': 0}, 'sign 0 is neither'),
+        ({'offset': math.nan}, 'offset nan'),
+        ({'lower': 1.0, 'upper': 0.5}, 'lower 1.0 is above upper 0.5'),
+        ({'lower': math.nan}, 'lower nan'),
+    ],
+)
+def test_settings_that_move_a_servo_wrongly_are_refused(
+    change: dict[str, Any], reason: str
+) -> None:
     """The message names the joint and the value."""
-    changes: dict[str, dict[str, Any]] = {
-        'sign 0 is neither': {'sign': 0},
-        'offset nan': {'offset': math.nan},
-        'lower 1.0 is above upper 0.5': {'lower': 1.0, 'upper': 0.5},
-        'lower nan': {'lower': math.nan},
-    }
-    for reason, change in changes.items():
-        with pytest.raises(CommandError, match=f'knee: {reason}'):
-            JointServo('knee', 11, **change)
+    with pytest.raises(CommandError, match=f'knee: {reason}'):
+        JointServo('knee', 11, **change)

@@ -280,7 +280,7 @@ def test_an_unseen_servo_has_arrived_only_when_it_has(
         (0.02, 0, 18, (0, 0)),
         (0.045, 0, 9, (0, 0)),
         (0.001, 10, 35, (1, 20)),
-        (math.inf, 0, 0, (10, 50)),
+        (math.inf, 0, 0, (20, 100)),
     ],
 )
 def test_a_slow_board_makes_the_reports_fewer(
@@ -292,7 +292,7 @@ def test_a_slow_board_makes_the_reports_fewer(
     """
     rig = OldRig(latency)
     for _ in range(2):
-        before, rig.dialect.counters.unanswered = len(rig.states), 0
+        before = len(rig.states)
         rig.run(1.0)
         assert len(rig.states) - before >= reports
         assert bool(rig.states) is (latency < math.inf)

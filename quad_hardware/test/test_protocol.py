@@ -118,23 +118,27 @@ def test_a_byte_is_the_nearest_one(span: Span, value: float) -> None:
     assert V1.functions[Register.VX].spans[Model.LITE].encode(0.0) == 0x80
 
 
-def test_what_does_not_fit_is_refused_by_name() -> None:
-    """Wrong counts, names, values and lengths say what would have been right."""
-    servos = V2.functions[Code.SERVOS]
-    refusals: list[tuple[Callable[[], object], str]] = [
-        (lambda: servos.pack(motor=(11,)), 'servos: angle missing or unknown'),
-        (lambda: servos.pack(motor=(11,), angle=(1.0, 2.0)), 'not as many'),
-        (lambda: servos.pack(motor=(12, 11), angle=(1.0, 400.0)), r'servos: .*400.0'),
-        (lambda: servos.pack(motor=(12, 11), angle=(1.0, math.nan)), r'servos: .*nan'),
-        (lambda: servos.unpack(bytes(4)), 'payload of 4 bytes, not 3'),
+SERVOS = V2.functions[Code.SERVOS]
+
+
+@pytest.mark.parametrize(
+    ('refused', 'reason'),
+    [
+        (lambda: SERVOS.pack(motor=(11,)), 'servos: angle missing or unknown'),
+        (lambda: SERVOS.pack(motor=(11,), angle=(1.0, 2.0)), 'not as many'),
+        (lambda: SERVOS.pack(motor=(12, 11), angle=(1.0, 400.0)), r'servos: .*400.0'),
+        (lambda: SERVOS.pack(motor=(12, 11), angle=(1.0, math.nan)), r'servos: .*nan'),
+        (lambda: SERVOS.unpack(bytes(4)), 'payload of 4 bytes, not 3'),
         (lambda: Span(-1, 1).encode(math.nan), 'NaN'),
         (lambda: Frame(Kind.WRITE, 0x50, bytes(248)).encode(V1), 'takes 247'),
         (lambda: Frame(Kind.PUSH, STATE.address).encode(V1), 'no frame of kind PUSH'),
         (lambda: Frame(Kind.READ, STATE.address).encode(V1), '0x110 does not fit protocol v1'),
-    ]
-    for refused, reason in refusals:
-        with pytest.raises(CodecError, match=reason):
-            refused()
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(refused: Callable[[], object], reason: str) -> None:
+    """Wrong counts, names, values and lengths say what would have been right."""
+    with pytest.raises(CodecError, match=reason):
+        refused()
 
 
 def test_motors_registers_and_slots_agree() -> None:

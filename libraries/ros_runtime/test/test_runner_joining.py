@@ -45,10 +45,10 @@ def test_a_process_that_others_can_reach_says_so(
     """However it was started, or that a person's profile decides; nothing by default."""
 
     def resolve(*_: Any) -> Reach:
-        return Reach((Interface('eth0', '10.0.0.5'),)) if value else Reach()
+        return Reach((Interface('eth0', '10.0.0.5'),))
 
-    unset.setattr('dds_network.environment.resolve_reach', resolve)
     if value:
+        unset.setattr('dds_network.environment.resolve_reach', resolve)
         unset.setenv(variable, value)
     init_ros()
     error = capfd.readouterr().err

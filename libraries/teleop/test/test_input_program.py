@@ -207,21 +207,21 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
         assert record.commands[-RESTS - 1 :] == END
 
 
-@pytest.mark.parametrize('how', ['robot', 'window'])
+@pytest.mark.parametrize('how', ['robot', 'window', 'signal'])
 def test_whatever_ends_it_the_robot_rests(how: str) -> None:
-    """An error while a key is held is passed on after the rests."""
+    """While a key is held; an error is passed on after the rests."""
     with at_terminal() as (terminal, robot, record, ended, thread):
         terminal.key('i', 1)
         record.wait_for(lambda commands: commands.count('i') >= 2)
         if how == 'robot':
             robot.fails = True
-        else:
+        elif how == 'window':
             terminal.hang_up()
-        thread.join(TIMEOUT)
-        assert [type(error) for error in ended] == [
-            RuntimeError if how == 'robot' else TerminalError
-        ]
-        assert [each for each in record.commands if each != 'i'] == END
+        if how != 'signal':  # it sets the event that is set where this block ends
+            thread.join(TIMEOUT)
+    error = {'robot': RuntimeError, 'window': TerminalError}.get(how)
+    assert [type(each) for each in ended] == ([error] if error else [])
+    assert [each for each in record.commands if each != 'i'] == END
 
 
 def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
