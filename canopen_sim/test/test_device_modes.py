@@ -384,6 +384,18 @@ def test_halt(mode: int, option: int, time: float) -> None:
     assert rig.get(0x6064) == 5000
 
 
+def test_a_halted_move_goes_on() -> None:
+    """To its own target, where no other one was set in the halt: bit 8 only interrupts it."""
+    rig = moving(1, speed=1000)
+    rig.command(NEW | HALT)
+    rig.run(1.0)
+    assert rig.get(0x606C) == 0
+    assert rig.get(0x6064) < 2000
+    rig.command(NEW)
+    rig.run(5.0)
+    assert rig.get(0x6064) == 2500
+
+
 def test_enabling_in_halt() -> None:
     """Nothing moves; then the velocity comes."""
     rig = Rig()

@@ -242,8 +242,9 @@ def test_master_boots_a_local_node_of_python_canopen() -> None:
             sdo = stranger.sdo
             assert (sdo[0x1017].raw, sdo[0x6081].raw, sdo[0x1A00][0].raw) == (100, 10_000, 2)
             observer.receive(0.0)
-            heartbeats = 0
+            heartbeats, deadline = 0, time.monotonic() + ARRIVAL
             while heartbeats < 10:  # three times as long as one may be missing
+                assert time.monotonic() < deadline, f'{heartbeats} heartbeats came'
                 heartbeats += sum(each.can_id == 0x702 for each in observer.receive(ARRIVAL))
             assert master.device('stranger').status().online
         finally:

@@ -354,9 +354,11 @@ def test_the_master_is_not_disturbed(robot: Robot) -> None:
     with ThreadPoolExecutor(1) as pool:
         busy = pool.submit(keep_busy)
         former = '--ask'  # codespell:ignore ask
-        scanned = main(['scan', *robot.arguments, former, '--listen', '0.2'])
-        compared = main(['diff', 'panda_joint1', *robot.arguments])
-        stop.set()
+        try:
+            scanned = main(['scan', *robot.arguments, former, '--listen', '0.2'])
+            compared = main(['diff', 'panda_joint1', *robot.arguments])
+        finally:
+            stop.set()
         assert busy.result(DEADLINE) > 5
     assert (scanned, compared) == (0, 0)
     robot.assert_undisturbed()

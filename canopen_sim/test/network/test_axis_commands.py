@@ -325,7 +325,7 @@ def test_the_buffer_of_mode_7_is_emptied_first() -> None:
 @pytest.mark.parametrize('mapped', [True, False], ids=['RPDO', 'SDO'])
 @pytest.mark.parametrize(
     ('quirk', 'reported', 'has'),
-    [*(('no_mode_zero', mode, 1) for mode in (0, 1, 3)), ('', 0, 3), ('', 0, 8)],
+    [*(('no_mode_zero', mode, 8) for mode in (0, 1, 3, 8)), ('', 0, 3), ('', 0, 8)],
 )
 def test_no_mode_is_sent_that_no_client_has_selected(
     quirk: str, reported: int, has: int, *, mapped: bool

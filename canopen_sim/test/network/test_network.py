@@ -440,6 +440,19 @@ def test_a_device_that_does_not_answer_sync_is_reported_before_its_heartbeat_is_
         assert net.drives['a'].view.fresh
 
 
+def test_pauses_of_a_busy_computer_are_summed_up() -> None:
+    """A line for each would bury what matters: what devices took for the end of the master."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2), heartbeat_timeout=0.3))
+    for number in range(50):
+        net.network.note_pause(0.12 + number * 1e-3, 0.5 * number)
+    lines = net.reported(Severity.WARNING)
+    assert len(lines) == 3
+    assert 'held up for 160 ms by this computer, and 19 times before, for 159 ms' in lines[-1]
+    assert 'taken it for dead' not in str(lines)
+    net.network.note_pause(0.6, 25.0)
+    assert 'taken it for dead' in net.reported(Severity.WARNING)[-1]
+
+
 CONTROLLER = 0x204  # a controller problem, with counters
 
 
@@ -743,9 +756,11 @@ def test_a_commanded_reset_is_no_error(enabled: VirtualNetwork) -> None:
         else:
             enabled.send_as('tool', Frame(0x000, nmt_frame(command, NODE_ID)))
         back(enabled)
-        assert [text for text in enabled.reported(Severity.WARNING) if 'EMCY' not in text] == []
-        assert f'a: restarts, by the NMT command {command.name}' in enabled.reported()
-        assert 'a: operational' in enabled.reported()
+        warned = [text for text in enabled.reported(Severity.WARNING) if 'EMCY' not in text]
+        assert warned == [], (command, ours)
+        reported = enabled.reported()
+        assert f'a: restarts, by the NMT command {command.name}' in reported, (command, ours)
+        assert 'a: operational' in reported, (command, ours)
         enabled.do(NODE, 'init')
         enabled.run(0.5)
         enabled.events.clear()

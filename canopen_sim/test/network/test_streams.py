@@ -17,7 +17,7 @@ from bus_rig import booted, JOINT, Leader, MODES, VirtualNetwork
 from drive_samples import drive_config, every_mode, MOTION_WRITES, pdo, PERIOD, SCALE, sdo_write
 import pytest
 
-from arm_canopen import DriveError, DriveState, OperationMode, Promise, RefusalCause
+from arm_canopen import DriveError, DriveState, OperationMode, Promise, RefusalCause, Severity
 from arm_canopen.config import RecoveryPolicy, SdoWrite
 from canopen_core.standard import POSITION_MODES, TORQUE_MODES
 
@@ -174,6 +174,22 @@ def test_a_stream_may_begin_where_the_axis_stands(mode: OperationMode) -> None:
         client.commands.stream_target(0.1 + 0.02 * max(0, number - 3))
         client.net.run(5 * PERIOD)
     assert client.net.motor() > 0.5
+
+
+def test_an_axis_that_does_not_stop_is_stopped_by_sdo() -> None:
+    """Its RPDOs are lost, so it would go on at the last velocity that it received."""
+    client = Publisher(OperationMode.PROFILE_VELOCITY)
+    for _ in range(60):
+        client.commands.stream_target(0.8)
+        client.net.run(PERIOD)
+    client.net.lose(0x202, 0x302)
+    client.net.run(4.0)
+    (error,) = client.net.reported(Severity.ERROR)
+    assert 'although it was halted: quick stop' in error
+    here = client.net.motor()
+    client.net.run(1.0)
+    assert client.net.motor() == here
+    assert not [text for text in client.net.reported() if 'stopped' in text]
 
 
 OFFSET_PDO = 0x500 + NODE_ID
