@@ -311,13 +311,16 @@ def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(
     urdf = robot_urdf('mini')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     beyond = [1.9 if name == 'fl_thigh_joint' else q for name, q in POSE.items()]
-    monkeypatch.setattr('quad_hardware.backend.CONNECT_TIME', 2.0)
+    monkeypatch.setattr('quad_hardware.backend.CONNECT_TIME', 0.1)
     with PtyPeer(tmp_path / 'port', V1, firmware='M-4.3.3') as peer:
-        with (
-            backend_of(peer) as other,
-            pytest.raises(NoAnswerError, match='start with preset mini'),
-        ):
-            other.reset()
+        with backend_of(peer) as other:
+
+            def refused() -> bool:
+                with pytest.raises(NoAnswerError) as refusal:
+                    other.reset()
+                return 'start with preset mini' in str(refusal.value)
+
+            wait_for(refused, 'refusal that names the preset')
         robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), urdf, joints))
         warnings: list[str] = []
         robot.on_warning = warnings.append

@@ -107,16 +107,16 @@ def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: 
     assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)
 
 
+@pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', 'far'])
 @pytest.mark.parametrize('option', ['--speed', '--distance'])
 def test_a_way_that_cannot_be_walked_is_refused(
-    option: str, capsys: pytest.CaptureFixture[str]
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Before anything moves, and the message names the option."""
-    for value in ('0', '-1', 'nan', 'inf', 'far'):
-        with pytest.raises(SystemExit) as ended:
-            run_calibrate(['odometry', f'{option}={value}'], Script())
-        assert ended.value.code == 2, value
-        assert option in capsys.readouterr().err, value
+    with pytest.raises(SystemExit) as ended:
+        run_calibrate(['odometry', f'{option}={value}'], Script())
+    assert ended.value.code == 2
+    assert option in capsys.readouterr().err
 
 
 @pytest.mark.scenario
@@ -285,10 +285,13 @@ def test_a_robot_of_another_kind_is_refused(
     with PtyPeer(tmp_path / 'port', protocol, firmware=firmware) as peer:
         peer.angles.update(dict.fromkeys(peer.angles, 5.0))
         command += ['--port', str(peer.link)]
-        script = Script('', '')
-        with monkeypatch.context() as patched:
-            patched.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', 1.5)
-            assert run_calibrate(command, script) == 1
+        for timeout in (1.5, 10.0):  # [s]; a busy machine takes longer to know the robot
+            script = Script('', '')
+            with monkeypatch.context() as patched:
+                patched.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', timeout)
+                assert run_calibrate(command, script) == 1
+            if re.search(words, script.said[-1]):
+                break
         assert re.search(words, script.said[-1])
         assert run_calibrate([*command, *options], Script('', '')) == 0
     joints: Any = read_parameters(output)['joints']
