@@ -203,9 +203,9 @@ def test_gait_policy_and_calibration_reach_their_nodes(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize('missing', OURS)
+def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> None:
     """Whichever package it is."""
-    for missing in OURS:
-        find = underlay(tmp_path, *(name for name in OURS if name != missing))
-        with pytest.raises(StartError, match='make build'):
-            quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
+    find = underlay(tmp_path, *(name for name in OURS if name != missing))
+    with pytest.raises(StartError, match='make build'):
+        quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
