@@ -67,6 +67,9 @@ def test_levelling_is_bounded_and_fades(roll: float, pitch: float) -> None:
     for _ in range(200):
         pose = leveller.step(None, UPRIGHT, 0.02)
     assert pose == pytest.approx(UPRIGHT, abs=1e-6)
+    asked = BodyPose(roll=roll, pitch=pitch)
+    level = Leveller(gain=0.8, most=0.2)
+    assert level.step((roll, pitch, 1.0), asked, 0.02) == asked, 'a tilt that was asked for'
 
 
 @given(poses, poses)

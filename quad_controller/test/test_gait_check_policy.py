@@ -109,6 +109,17 @@ def test_a_policy_that_bytes_do_not_suffice_for_is_found_over_v1(
     assert 'set noise' in capsys.readouterr().out
 
 
+def test_a_policy_that_only_stands_walks_nowhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The walk reports what happened, and not what was commanded; that is no success."""
+    path = write_policy(tmp_path / 'still.onnx', metadata())
+    assert run([str(path), '--walk', '0.2', '0', '0', '--duration', '1']) == 1
+    output = capsys.readouterr().out
+    assert float(output.partition(' went ')[2].split()[0]) == pytest.approx(0.0, abs=0.02)
+    assert 'hardly any: look at the command' in output
+
+
 def damped(path: Path) -> Path:
     """Write the shipped policy with a feedback that damps roll and pitch by the angular velocity.
 

@@ -21,7 +21,7 @@ from sensor_msgs.msg import Imu, JointState
 
 from message_templates import FastReader
 from quad_controller import Controller, GaitParameters, Output, StateParameters
-from quad_controller.nodes.control_loop import ControlLoop, Pacer, WINDOW
+from quad_controller.nodes.control_loop import ControlLoop, loop_figures, Pacer, WINDOW
 from quad_controller.nodes.messages import (
     body_pose,
     CommandFilter,
@@ -288,3 +288,11 @@ def test_a_late_step_is_not_made_up_for() -> None:
     pacer.stepped(0.105, None)
     assert pacer.overruns == 4
     assert 0.105 < pacer.deadline(fresh=False) <= 0.125
+
+
+def test_jitter_is_the_distance_of_intervals_from_the_period() -> None:
+    """A short interval counts as a long one does."""
+    steps = [(interval, 0.0002, 0.001) for interval in (0.02, 0.021, 0.018)]
+    expected = {'rate': 3 / 0.059, 'jitter_p50': 0.001, 'jitter_max': 0.002}
+    figures = loop_figures(steps, PERIOD)
+    assert {name: figures[name] for name in expected} == pytest.approx(expected)

@@ -504,6 +504,16 @@ def test_limits_and_slew_of_velocities_count_for_a_policy() -> None:
     assert policy.velocities[-1] == Velocity()
 
 
+def test_an_attitude_may_be_done_without() -> None:
+    """With require_imu off a robot that never had one stands up and walks; a policy does not."""
+    rig, _ = policy_rig(require_imu=False)
+    rig.imu = None
+    standing(rig).ask('walk')
+    rig.run(1.0, FORWARD)
+    assert rig.is_in(State.WALK)
+    assert not rig.controller.set_mode('policy').accepted
+
+
 def test_messages_of_no_use_are_the_reason_of_the_silence() -> None:
     """A fault after joint states without a joint names it, and not the cable."""
     rig = standing()

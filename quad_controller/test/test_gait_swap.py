@@ -8,9 +8,20 @@ from dataclasses import replace
 
 import pytest
 
-from quad_controller import State, Velocity
+from quad_controller import find_policy, GaitGenerator, load_policy, PolicyOptions, State, Velocity
 from quad_description import Targets
-from quad_gait_rig import PERIOD, policy_rig, STAND, standing, StillPolicy, tilted
+from quad_gait_rig import (
+    FIRM,
+    firm,
+    MODEL,
+    PERIOD,
+    PhysicsRig,
+    policy_rig,
+    STAND,
+    standing,
+    StillPolicy,
+    tilted,
+)
 
 CROUCHED = tuple(angle + 0.1 for angle in STAND)
 STANDING_LOW = tuple(angle + 0.05 for angle in STAND)
@@ -121,3 +132,23 @@ def test_a_policy_that_misses_a_measurement_is_refused_before_the_robot_stands()
     assert missing in rig.controller.set_mode('policy').message
     assert rig.is_in(State.WALK)
     assert any('max_turn_rate' in text for text in rig.controller.status.warnings)
+
+
+@pytest.mark.slow
+def test_gait_policy_and_gait_walk_on_in_physics() -> None:
+    """From one to the other at 0.15 m/s, the robot goes on as commanded and stays level."""
+    stand = GaitGenerator(MODEL, FIRM).stand_targets
+    path = find_policy('trot_ppo')
+    policy = load_policy(path, MODEL, stand, PolicyOptions(), PERIOD).runner
+    rig = PhysicsRig(firm(), FIRM)
+    rig.mode('walk')
+    rig.run(1.0, FORWARD)
+    rig.tilt = 0.0
+    for each, state in ((policy, State.POLICY), (None, State.WALK)):
+        assert rig.controller.follow(each).accepted
+        rig.run(4.0, FORWARD)
+        assert rig.controller.status.state is state
+        assert rig.tilt < 0.15, f'on the way to {state}'
+        travel = rig.travel(2.0, FORWARD)
+        assert travel.x == pytest.approx(FORWARD.x, abs=0.03)
+        assert travel.tilt < 0.15
