@@ -281,6 +281,13 @@ def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
         assert peer.commands == []
 
 
+def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:
+    """Without any port, it ends, and says so."""
+    with Rig(tmp_path / 'nothing') as rig:
+        wait_for(lambda: 'no such device' in rig.driver.status().detail, 'reason')
+    assert rig.changes[-1][0] is LinkState.STOPPED
+
+
 def test_a_failure_is_reported_and_got_over(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
