@@ -211,12 +211,13 @@ def test_more_is_faster_and_the_other_way_is_back(axis: int) -> None:
 
 
 @pytest.mark.parametrize('byte', [127, 128])
-def test_both_middles_are_rest(byte: int) -> None:
+@pytest.mark.parametrize('register', [Register.VX, Register.VY, Register.VYAW])
+def test_both_middles_are_rest(register: Register, byte: int) -> None:
     """From a walk the robot comes to rest on its feet, and goes nowhere."""
     robot = standing()
-    write(robot, Register.VX, 230)
+    write(robot, register, 230)
     robot.run(1.0)
-    write(robot, Register.VX, byte)
+    write(robot, register, byte)
     robot.run(1.0)
     assert robot.simulation.board.walker.command == (0.0, 0.0, 0.0), 'it does not creep'
     assert max(map(abs, travel(robot, 0.5))) < 0.01
