@@ -271,6 +271,21 @@ def test_any_bytes_are_a_possible_frame_or_refused(datagram: bytes) -> None:
     encode(frame)
 
 
+@pytest.mark.parametrize(
+    ('datagram', 'reason'),
+    [
+        (msgpack.packb({'is_fd': True}), 'CAN FD'),
+        (msgpack.packb({'arbitration_id': 'x'}), "identifier 'x'"),
+        (msgpack.packb({'data': 'text'}), "payload 'text'"),
+        (b'\xc1', 'no msgpack'),
+    ],
+)
+def test_what_is_no_classic_frame_is_named(datagram: bytes, reason: str) -> None:
+    """Each way to be wrong has its own message."""
+    with pytest.raises(CodecError, match=reason):
+        decode(datagram, 0.0)
+
+
 @given(sent=st.lists(st.tuples(frames(), st.integers(-1, 170), st.binary(min_size=1, max_size=3))))
 def test_compiled_and_python_reader_receive_the_same(
     sent: list[tuple[Frame, int, bytes]],

@@ -65,7 +65,8 @@ def test_method_finds_its_home(method: int) -> None:
         rig.run(0.01)
         assert not rig.statusword & (ATTAINED | ERROR)
         rig.run(20.0)
-        assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ATTAINED
+        ended = rig.statusword & (REACHED | ATTAINED | ERROR)
+        assert ended == REACHED | ATTAINED, (start, speed)
         assert rig.drive.origin == pytest.approx(40 - HOMES[method]), (start, speed)
 
 

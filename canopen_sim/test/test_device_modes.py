@@ -236,7 +236,7 @@ def test_a_rising_edge_of_bit_4_hands_over() -> None:
         ((SHUTDOWN, SWITCH_ON, ENABLE), 0),  # a target alone
         ((SHUTDOWN, SWITCH_ON, ENABLE, NEW), 300),  # held afterwards: one set-point
         ((SHUTDOWN, SWITCH_ON, NEW), 300),  # enables and offers in one
-        ((0x16, 0x17, NEW), 0),  # no edge: the bit was there before,
+        ((0x16, 0x17, NEW), 0),  # no edge: the bit was there before
     ):
         rig = Rig()
         rig.put(0x6060, 1)

@@ -170,7 +170,9 @@ def test_ways_to_stop(
     rig = moving(3, option, 1000)
     if not words:
         rig.drive.raise_fault(0x2310, rig.now)
-    rig.command(*words)
+    rig.command(*words[:2])
+    rig.run(0.05 if words[2:] else 0.0)
+    rig.command(*words[2:])
     duration, distance, seen = ramp(rig)
     assert seen == states
     if time is None:  # the motor runs out

@@ -128,7 +128,7 @@ def test_which_entries_are_read_and_which_one_is_the_masters() -> None:
         ({1: OTHER, 3: 1 << 16 | 100}, 3),  # the master's, from before
         ({1: OTHER, 3: OTHER, 4: OTHER}, None),
         ({1: None}, 1),  # it cannot be read, and may be free
-        ({1: OTHER, 3: None}, None),  # the EDS promises more than the device has,
+        ({1: OTHER, 3: None}, None),  # the EDS promises more than the device has
     ):
         scene = Scene(0)
         held: dict[int, int | None] = {}

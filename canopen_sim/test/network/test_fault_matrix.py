@@ -425,7 +425,7 @@ STREAMED = (OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION)
 @pytest.mark.parametrize(
     ('loss', 'mode'),
     with_modes(
-        [(TPDOS, ONE), (TPDOS, BOTH), (RPDOS, ONE), (RPDOS, BOTH), (ALL, BOTH)], 0, 1, 3, 6
+        [(lost, names) for lost in (TPDOS, RPDOS, ALL) for names in (ONE, BOTH)], 0, 1, 3, 6
     ),
 )
 def test_lost_pdos_in_motion(

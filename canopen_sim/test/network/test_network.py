@@ -573,8 +573,8 @@ def test_a_device_that_never_answers_guarding_is_reported_once_and_left_in_peace
 def test_an_emergency_is_received_where_the_device_sends_it() -> None:
     """Under the identifier of 0x1014: as bus.yml writes it, else as the EDS has it.
 
-    Where an EDS leaves the node id out, it is that of the device, and never in the place of SYNC.
-    A device keeps an identifier in use, so EMCY and TIME are off while theirs changes.
+    Where an EDS has no node id, or that of another, it is the one of the device, and never in the
+    place of SYNC. A device keeps an identifier in use: EMCY and TIME are off while theirs changes.
     """
     written = drive_config('a', 2)
     time = ObjectEntry(0x1012, 0, 'TIME', DataType.UNSIGNED32, default=0x8000_0100)
@@ -591,19 +591,23 @@ def test_an_emergency_is_received_where_the_device_sends_it() -> None:
     nameless = drive_config('d', 5)
     without_id = with_defaults(nameless.dictionary, {(0x1014, 0): 0x80})
     nameless = replace(nameless, dictionary=without_id.for_node(5))
+    foreign = drive_config('e', 6)
+    of_another = with_defaults(foreign.dictionary, {(0x1014, 0): 0x91})
+    foreign = replace(foreign, dictionary=of_another.for_node(6))
     net = VirtualNetwork(
-        bus_config(written, eds, silent, nameless), dictionaries={'d': without_id}
+        bus_config(written, eds, silent, nameless, foreign),
+        dictionaries={'d': without_id, 'e': of_another},
     )
     net.boot()
     assert net.devices['a'].clock.can_id == 0x181
-    for name in ('a', 'c', 'd'):
+    for name in ('a', 'c', 'd', 'e'):
         net.devices[name].faults.inject(FaultInjection(Fault.OVER_TEMPERATURE), net.now)
     net.send_as('b', Frame(0x0B3, bytes.fromhex('10 43 01 00 00 00 00 00')))
     net.run(0.1)
     nodes = net.network.nodes.items()
     received = {name: [emcy.code for _, emcy in node.emergencies.history] for name, node in nodes}
-    assert received == {'a': [0x4310], 'b': [0x4310], 'c': [], 'd': [0x4310]}
-    assert len(net.frames(0x0A2)) == len(net.frames(0x085)) == 1
+    assert received == {name: [] if name == 'c' else [0x4310] for name in 'abcde'}
+    assert [len(net.frames(can_id)) for can_id in (0x0A2, 0x085, 0x086)] == [1, 1, 1]
     net.network.receive(Frame(SYNC, b'', net.now))
     assert any('another node sends SYNC' in text for text in net.reported())
     assert len(net.network.nodes['d'].emergencies.history) == 1
@@ -1008,6 +1012,18 @@ def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, ste
         clock = Clock(lambda: beside.now, Future)
         master = CanopenMaster(BUS, beside, beside_master=True, clock=clock)
         assert 'another master is on here is not known' in master.listen()
+
+
+def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
+    """At whatever moment one listens to a running master, it is detected, and no device is."""
+    net = booted(*BUS.nodes)
+    signs = MasterFrames(BUS)
+    for moment in (0.0, 0.0037, 0.0074):  # of a cycle
+        begin = net.now + moment
+        net.run(moment + LISTENING_TIME)
+        heard = [s.frame for s in net.wire.log if s.sender == 'master' and s.time >= begin]
+        assert any(signs.read(frame) for frame in heard), moment
+    assert not any(signs.read(s.frame) for s in net.wire.log if s.sender != 'master')
 
 
 def test_beside_another_master_no_command_is_for_all() -> None:
