@@ -21,6 +21,7 @@ from planning_messages import box, pose_at
 from processes import executable, RunningProcess
 import pytest
 import rclpy
+from rclpy.action.server import ActionServer
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import ArmError
@@ -125,7 +126,7 @@ def test_what_is_missing_is_named(tmp_path: Path, remove: str, words: str) -> No
         settings_of(folder)
 
 
-@pytest.fixture(name='panda', scope='module')
+@pytest.fixture(name='running_panda', scope='module')
 def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[mg.MoveGroupRig]:
     """Start move_group with the Panda's package."""
     folder = mg.moveit_package('panda', tmp_path_factory.mktemp('package'))
@@ -135,6 +136,25 @@ def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[mg.MoveGro
         mg.MoveGroupRig(isolation, '--moveit-config', str(folder), positions=positions) as rig,
     ):
         yield rig
+
+
+@pytest.fixture(name='panda')
+def reset_panda(running_panda: mg.MoveGroupRig) -> Iterator[mg.MoveGroupRig]:
+    """Return it with the robot at ready and an empty scene; end what the test has begun."""
+    running_panda.reset()
+    node = running_panda.client.node
+    timers = list(node.timers)
+    yield running_panda
+    goals = [each for each in running_panda.held if each.is_active]
+    for goal in goals:
+        goal.execute()
+    running_panda.client.spin_until(
+        lambda: not any(each.is_active for each in goals), 60.0, 'end of goals'
+    )
+    for timer in set(node.timers).difference(timers):
+        node.destroy_timer(timer)
+    for server in [each for each in node.waitables if isinstance(each, ActionServer)]:
+        server.destroy()
 
 
 def duration(response: Any) -> float:
@@ -194,7 +214,7 @@ def test_cartesian_limits_of_the_package_bound_a_line(panda: mg.MoveGroupRig) ->
 
 def test_the_gripper_of_the_package_is_moved(panda: mg.MoveGroupRig) -> None:
     """A GripperCommand with the joint that follows the other one in its list."""
-    server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1')
+    panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1')
     # MoveGroupInterface names joints that follow others, too
     for place, joints in ((0.03, FINGERS[:1]), (0.01, FINGERS)):
         goal = mg.joint_goal([place] * len(joints), joints)
@@ -216,7 +236,6 @@ def test_the_gripper_of_the_package_is_moved(panda: mg.MoveGroupRig) -> None:
     _status, result = panda.move(mg.action_goal(mg.motion_request(apart, 'hand')))
     assert result.error_code.val == MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
     assert 'panda_finger_joint1 contradict' in result.error_code.message
-    server.destroy()
 
 
 def held(rig: mg.MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
@@ -244,12 +263,11 @@ def outcome(rig: mg.MoveGroupRig, result: Any) -> int:
 
 def test_a_gripper_takes_the_time_that_it_needs(panda: mg.MoveGroupRig) -> None:
     """It closes until it stalls, and a cancel would end its grip."""
-    server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1', holds=True)
+    panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1', holds=True)
     result, allowed = held(panda, mg.joint_goal([0.02], ['panda_finger_joint1']), 'hand')
     panda.client.spin_for(allowed + 1.0)
     assert not panda.held[0].is_cancel_requested
     assert outcome(panda, result) == MoveItErrorCodes.SUCCESS
-    server.destroy()
 
 
 def test_the_state_of_a_controller_says_how_long_it_may_take(panda: mg.MoveGroupRig) -> None:
@@ -257,7 +275,7 @@ def test_the_state_of_a_controller_says_how_long_it_may_take(panda: mg.MoveGroup
 
     So is one that leaves the factor at 0, as many releases of joint_trajectory_controller do.
     """
-    server = panda.serve_arm('panda_arm_controller', holds=True)
+    panda.serve_arm('panda_arm_controller', holds=True)
     topic = '/panda_arm_controller/controller_state'
     node, slow = panda.client.node, MoveItErrorCodes.TIMED_OUT
     states = node.create_publisher(JointTrajectoryControllerState, topic, 10)
@@ -268,7 +286,7 @@ def test_the_state_of_a_controller_says_how_long_it_may_take(panda: mg.MoveGroup
         state.reference.positions[0] += step
         states.publish(state)
 
-    timer = node.create_timer(0.02, publish)
+    node.create_timer(0.02, publish)
     panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
 
     def begun() -> tuple[Any, float]:
@@ -295,8 +313,6 @@ def test_the_state_of_a_controller_says_how_long_it_may_take(panda: mg.MoveGroup
     state.speed_scaling_factor = 1.0
     panda.client.spin_until(is_canceled, 60.0, 'cancel at full speed')
     assert outcome(panda, result) == slow
-    node.destroy_timer(timer)
-    server.destroy()
 
 
 def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: mg.MoveGroupRig) -> None:
@@ -323,7 +339,6 @@ def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: mg.MoveG
     panda.client.spin_until(result.done, 20.0, 'result')
     assert result.result().status == GoalStatus.STATUS_CANCELED
     assert result.result().result.error_code.val == MoveItErrorCodes.PREEMPTED
-    panda.reset()
 
 
 def test_the_log_has_what_is_without_effect_once(panda: mg.MoveGroupRig) -> None:
