@@ -512,6 +512,8 @@ def test_an_attitude_may_be_done_without() -> None:
     rig.run(1.0, FORWARD)
     assert rig.is_in(State.WALK)
     assert not rig.controller.set_mode('policy').accepted
+    measured = RobotState(JointSample(rig.positions, (0.0,) * 12))
+    assert rig.controller.step(measured, PERIOD).ready, 'a bring-up would wait for ever'
 
 
 def test_messages_of_no_use_are_the_reason_of_the_silence() -> None:

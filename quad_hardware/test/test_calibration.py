@@ -285,7 +285,7 @@ def test_a_robot_of_another_kind_is_refused(
     with PtyPeer(tmp_path / 'port', protocol, firmware=firmware) as peer:
         peer.angles.update(dict.fromkeys(peer.angles, 5.0))
         command += ['--port', str(peer.link)]
-        for timeout in (1.5, 10.0):  # [s]; a busy machine takes longer to know the robot
+        for timeout in (0.5, 10.0):  # [s]; a busy machine takes longer to know the robot
             script = Script('', '')
             with monkeypatch.context() as patched:
                 patched.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', timeout)
