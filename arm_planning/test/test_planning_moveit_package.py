@@ -154,7 +154,7 @@ def reset_panda(running_panda: mg.MoveGroupRig) -> Iterator[mg.MoveGroupRig]:
     for timer in set(node.timers).difference(timers):
         node.destroy_timer(timer)
     for server in [each for each in node.waitables if isinstance(each, ActionServer)]:
-        server.destroy()
+        server.destroy()  # type: ignore[no-untyped-call]
 
 
 def duration(response: Any) -> float:

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from dataclasses import replace
 import math
+from typing import Any
 
 from core_commands import kept
 from hypothesis import example, given, settings
@@ -26,7 +28,7 @@ from servo_commands import (
     twist,
 )
 
-from arm_model import JointLimits
+from arm_model import ArmError, JointLimits
 from arm_servo import JogRequest, PauseRequest, PoseCommand, SpeedRequest, StopRequest
 from arm_servo.controllers.controller import MOTIONS
 from arm_servo.core.requests import ImmediateRequest
@@ -124,6 +126,28 @@ def test_set_points_keep_every_limit(name: str, plan: Plan) -> None:
     for loss in losses:  # an ideal drive stands still at once when it is not commanded
         rates[max(loss - 1, 0) : loss + 1, 3] = 0.0
     assert (rates.max(axis=0) <= 1.02 * robot(name).limits.acceleration + 1e-6).all()
+
+
+def test_a_refused_command_changes_nothing() -> None:
+    """A jog that is under way goes on as if there had been no other."""
+    drives, alone = Drives().following(), Drives().following()
+    for each in (drives, alone):
+        jog(each.gateway, {'panda_joint1': 0.2}, each.now, 5.0)
+        each.run(20)
+    gateway, nan = drives.gateway, math.nan
+    there = [GoalPoint(1.0, [axis.setpoint + 9.0 for axis in drives.axes])]
+    refused: list[Future[Any]] = [
+        twist(gateway, [nan] * 6, drives.now),
+        jog(gateway, {'panda_joint2': 0.1}, drives.now, nan),
+        move_by(gateway, {'panda_joint1': nan}).future,
+        move_by(gateway, {'panda_joint1': 9.0}).future,
+        gateway.request(TrajectoryGoal(gateway.model.joints, there)).future,
+    ]
+    for each in (drives, alone):
+        each.run(30)
+    assert all(isinstance(each.exception(0.0), ArmError) for each in refused)
+    assert drives.path[-1].tolist() == alone.path[-1].tolist()
+    assert drives.axes[0].velocity == pytest.approx(0.2, abs=1e-3)
 
 
 pytestmark = pytest.mark.slow

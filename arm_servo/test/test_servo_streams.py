@@ -14,8 +14,9 @@ from control_msgs.msg import JointTolerance
 from isolation import Isolation
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from servo_commands import Drives, PERIOD
-from servo_nodes import ros_node
+from servo_nodes import GoalNode, ros_node
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
@@ -27,9 +28,12 @@ from arm_servo import (
     JointCommand,
     NotReadyError,
     Source,
+    TargetRequest,
 )
 from arm_servo.core.gateway import TOGETHER
 from arm_servo.core.requests import by_joint
+from arm_servo.ros.gripper import PARALLEL
+from arm_servo.ros.group_motion import build_tool
 from arm_servo.ros.trajectory import TrajectoryController
 from arm_servo.ros.trajectory_goals import declare_trajectory, goal_of_action
 from arm_trajectory import GoalRules
@@ -278,6 +282,28 @@ def test_who_activates_the_controller_lets_a_stream_in(arm: Arm) -> None:
     rest = arm.position
     arm.stream()
     assert arm.position > rest + MOVED
+
+
+def test_a_deactivated_controller_moves_no_gripper(
+    node: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is under way comes to rest, and what comes next is refused."""
+    drives, goals = Drives().following(), GoalNode(monkeypatch)
+    node.servers = goals.servers
+    tool = build_tool(drives.gateway.model, node, lambda *_: drives.gateway)
+    del goals.servers[0]  # of trajectories
+    command = drives.gateway.request(TargetRequest({'panda_joint1': 1.0}, 0.1))
+    drives.run(20)
+    assert not command.ended.done()
+    assert tool.set_active is not None
+    tool.set_active(False)
+    drives.run(100)
+    assert command.ended.result(0.0).canceled
+    rest = drives.path[-1]
+    state = JointState(name=['panda_joint1'], position=[1.0])
+    handle = goals.send(PARALLEL.action.Goal(command=state))
+    drives.run(20)
+    assert (handle.ending, drives.path[-1].tolist()) == ('aborted', rest.tolist())
 
 
 def test_an_empty_trajectory_stops(arm: Arm) -> None:
