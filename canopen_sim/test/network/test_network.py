@@ -1021,8 +1021,8 @@ def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
     for moment in (0.0, 0.0037, 0.0074):  # of a cycle
         begin = net.now + moment
         net.run(moment + LISTENING_TIME)
-        heard = [s.frame for s in net.wire.log if s.sender == 'master' and s.time >= begin]
-        assert any(signs.read(frame) for frame in heard), moment
+        received = [s.frame for s in net.wire.log if s.sender == 'master' and s.time >= begin]
+        assert any(signs.read(frame) for frame in received), moment
     assert not any(signs.read(s.frame) for s in net.wire.log if s.sender != 'master')
 
 
