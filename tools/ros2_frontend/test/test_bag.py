@@ -94,12 +94,14 @@ def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> No
 
 
 def test_a_signal_ends_it_with_a_whole_recording(env: Mapping[str, str], tmp_path: Path) -> None:
-    """While messages arrive: SIGTERM as Ctrl-C, which ends those of the other tests."""
+    """While messages arrive: SIGTERM as Ctrl-C, and twice at once, as `timeout` sends it."""
     topics = ['--topics', '/numbers', '/loose']
     with record(env, tmp_path / 'bag', *topics) as recorder, source(env, 100_000) as publisher:
         publisher.wait_for('connected')
-        recorder.signal(signal.SIGTERM)
+        for _ in range(2):
+            recorder.signal(signal.SIGTERM)
         assert recorder.wait() == 0
+    assert 'Recording stopped' in recorder.output
     numbers = read(tmp_path / 'bag').get('/numbers', [])
     assert numbers == list(range(len(numbers)))
 

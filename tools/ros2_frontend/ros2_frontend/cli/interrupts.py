@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import math
 import os
 import select
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 
 
@@ -53,6 +55,9 @@ def _typed(number: int) -> str:
 
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+ECHO_TIME = 0.5
+"""Time in [s] in which further signals count as the same one: `timeout` sends its signal twice."""
+_taken = [-math.inf]  # steady time of the last signal that was not such an echo in [s]
 
 
 @contextlib.contextmanager
@@ -93,7 +98,14 @@ def _handling(handler: Callable[[int, FrameType | None], object]) -> Iterator[No
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and runs them
         return
-    previous = {number: signal.signal(number, handler) for number in _SIGNALS}
+
+    def take(number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if now - _taken[0] >= ECHO_TIME:
+            _taken[0] = now
+            handler(number, frame)
+
+    previous = {number: signal.signal(number, take) for number in _SIGNALS}
     try:
         yield
     finally:

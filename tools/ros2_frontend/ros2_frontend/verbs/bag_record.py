@@ -136,5 +136,6 @@ def record(args: Namespace) -> None:
                 # once more, while the files are being finished, ends nothing
                 with contextlib.suppress(KeyboardInterrupt), deferred_interrupts():
                     recorder.stop()
-        total = sum(recorder.counts.values())
-        session.node.get_logger().info(f"Recording stopped: {total} messages in '{folder}'")
+                    total = sum(recorder.counts.values())
+                    done = f"Recording stopped: {total} messages in '{folder}'"
+                    log.info(done)
