@@ -264,8 +264,10 @@ def see_fault(page: Page, reason: str, action: str) -> None:
     state, button = page.locator('#rv-state'), page.locator('#rv-do')
     groups = page.locator('[role=tab]').all_inner_texts()[:GROUPS]
     assert len(groups) == GROUPS, groups
+    tab = page.get_by_role('tab', name=groups[0], exact=True)
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({'width': width, 'height': height})
+        _wait_until_it_stands(tab, IN_SIGHT)  # viser has laid its panel out anew
         for group in groups:
             show(page, group)
             where = size, group
@@ -273,6 +275,7 @@ def see_fault(page: Page, reason: str, action: str) -> None:
             assert (button.inner_text(), button.evaluate(REACHED)) == (action, True), where
             assert not page.evaluate(ACTIVE), where
     page.set_viewport_size(SIZE)  # type: ignore[arg-type]
+    _wait_until_it_stands(tab, IN_SIGHT)
 
 
 def act(page: Page, action: str) -> None:
